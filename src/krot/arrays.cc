@@ -96,31 +96,23 @@ KnownRotationProblem ProblemOf(const KnownRotations& input) {
   return problem;
 }
 
-KnownRotationsTermination TerminationOf(InitializerTermination termination) {
+KnownRotationsTermination TerminationOf(SolveTermination termination) {
   switch (termination) {
-    case InitializerTermination::kInfeasible:
+    case SolveTermination::kGapReached:
+      return KnownRotationsTermination::kGapReached;
+    case SolveTermination::kMaxIterations:
+      return KnownRotationsTermination::kMaxIterations;
+    case SolveTermination::kStalled:
+      return KnownRotationsTermination::kStalled;
+    case SolveTermination::kInfeasible:
       return KnownRotationsTermination::kInfeasible;
-    case InitializerTermination::kInterrupted:
+    case SolveTermination::kNoStart:
+      return KnownRotationsTermination::kNoStart;
+    case SolveTermination::kInterrupted:
       return KnownRotationsTermination::kInterrupted;
     default:
-      return KnownRotationsTermination::kNoStart;
+      return KnownRotationsTermination::kNotRun;
   }
-}
-
-KnownRotationsTermination TerminationOf(JointTermination termination) {
-  switch (termination) {
-    case JointTermination::kGapReached:
-      return KnownRotationsTermination::kGapReached;
-    case JointTermination::kMaxIterations:
-      return KnownRotationsTermination::kMaxIterations;
-    case JointTermination::kStalled:
-      return KnownRotationsTermination::kStalled;
-    case JointTermination::kInterrupted:
-      return KnownRotationsTermination::kInterrupted;
-    case JointTermination::kNotRun:
-      break;
-  }
-  return KnownRotationsTermination::kNotRun;
 }
 
 }  // namespace
@@ -164,7 +156,7 @@ KnownRotationsResult SolveKnownRotations(const KnownRotations& problem,
   estimate.translations.resize(built.num_frames, Vector3d::Zero());
   estimate.points.resize(built.num_points, Vector3d::Zero());
   const InitializerSummary found = FindStart(built, start, context, &estimate);
-  if (found.termination != InitializerTermination::kFeasible) {
+  if (found.termination != SolveTermination::kWithinBound) {
     result.termination = TerminationOf(found.termination);
     result.lower_bound = found.lower_bound;
     return result;

@@ -15,7 +15,6 @@
 #include "krot/base/context.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/options/command_options.h"
-#include "krot/outliers/filter_steps.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/report/reports.h"

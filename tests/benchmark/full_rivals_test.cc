@@ -45,7 +45,7 @@ class FullRivals : public testing::Test {
 TEST_F(FullRivals, GugatReachesTheCertifiedOptimum) {
   Estimate joint = model_.built.start;
   const JointSummary summary = SolveJoint(problem(), {}, {}, &joint);
-  ASSERT_EQ(summary.termination, JointTermination::kGapReached);
+  ASSERT_EQ(summary.termination, SolveTermination::kGapReached);
   const double cost = CostOf(Solve(MakeFullGugat().get()));
   EXPECT_GE(cost, summary.lower_bound);
   EXPECT_LE(cost, (1 + 2e-4) * summary.cost_final);

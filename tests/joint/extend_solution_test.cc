@@ -1,4 +1,3 @@
-
 #include <algorithm>
 
 #include <gtest/gtest.h>
@@ -74,7 +73,7 @@ TEST(ExtendSolution, FailsWhereNoEstimateIsBelow) {
     const Solved solved(seed, 60, 5);
     Estimate optimum = solved.scene.estimate;
     const JointSummary all = SolveJoint(solved.scene.problem, {}, {}, &optimum);
-    ASSERT_EQ(all.termination, JointTermination::kGapReached);
+    ASSERT_EQ(all.termination, SolveTermination::kGapReached);
     if (all.lower_bound <= kRoom * solved.level) continue;
     ++num_impossible;
     Estimate extended;

@@ -143,7 +143,7 @@ void ExpectOptimumOfMerged(const RandomScene& scene, Norm norm,
   Estimate estimate = scene.estimate;
   const JointSummary summary =
       SolveJoint(scene.problem, FixedOptions(norm), {}, &estimate);
-  EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+  EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
   ExpectInPlace(scene.problem, estimate);
   EXPECT_EQ(summary.cost_final, Cost(scene.problem, estimate, norm, 1));
   ASSERT_TRUE(summary.certificate);
@@ -157,7 +157,7 @@ void ExpectOptimumOfMerged(const RandomScene& scene, Norm norm,
       SolveJoint(merged.problem, FixedOptions(norm), {}, &merged.estimate);
   // One point through shifted cameras has baselines that say nothing.
   if (!IsScaleFree(scene.problem)) {
-    EXPECT_EQ(expected.termination, JointTermination::kGapReached);
+    EXPECT_EQ(expected.termination, SolveTermination::kGapReached);
   }
   EXPECT_NEAR(summary.cost_final, expected.cost_final,
               tolerance * expected.cost_final);
@@ -256,7 +256,7 @@ TEST(Fixed, PositionsHoldAStartFromNothing) {
     Estimate nothing;
     const InitializerSummary summary =
         FindStart(scene.problem, {}, {}, &nothing);
-    ASSERT_EQ(summary.termination, InitializerTermination::kFeasible);
+    ASSERT_EQ(summary.termination, SolveTermination::kWithinBound);
     ExpectInPlace(scene.problem, nothing);
     EXPECT_LT(Cost(scene.problem, nothing, Norm::L2(), 1), 100);
   }
@@ -271,7 +271,7 @@ TEST(Fixed, PositionsThatContradictTheBoundAreProvedToDoSo) {
   Estimate nothing;
   const InitializerSummary summary =
       FindStart(scene.problem, options, {}, &nothing);
-  EXPECT_EQ(summary.termination, InitializerTermination::kInfeasible);
+  EXPECT_EQ(summary.termination, SolveTermination::kInfeasible);
   EXPECT_GT(summary.lower_bound, 10);
 }
 

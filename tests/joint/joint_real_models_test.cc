@@ -44,7 +44,7 @@ class RealModelTest : public testing::TestWithParam<RealModel> {
     options.relative_gap = kReferenceGap;
     const JointSummary summary =
         SolveJoint(built_.problem, options, {}, &estimate);
-    EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+    EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
     const double optimum = GetParam().optimum;
     // Five digits are known.
     EXPECT_NEAR(summary.cost_final, optimum, 1e-4 * optimum + 5e-5);
@@ -86,7 +86,7 @@ using FindStartOfRealModel = RealModelTest;
 TEST_P(FindStartOfRealModel, LeadsToTheReferenceOptimum) {
   Estimate estimate;
   const InitializerSummary start = FindStart(built_.problem, {}, {}, &estimate);
-  ASSERT_EQ(start.termination, InitializerTermination::kFeasible);
+  ASSERT_EQ(start.termination, SolveTermination::kWithinBound);
   EXPECT_LT(start.cost, InitializerOptions().max_error);
   ExpectOptimumFrom(estimate);
 }

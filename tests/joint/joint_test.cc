@@ -27,7 +27,7 @@ JointOptions Options(Norm norm) {
 // Recomputes everything that the summary claims.
 void ExpectCertified(const KnownRotationProblem& problem, Norm norm,
                      const Estimate& estimate, const JointSummary& summary) {
-  EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+  EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
   EXPECT_EQ(summary.cost_final, Cost(problem, estimate, norm, 1));
   EXPECT_LE(summary.cost_final, summary.cost_initial);
   ASSERT_TRUE(summary.certificate);
@@ -85,7 +85,6 @@ TEST_P(SolveJointTest, ProvesItsOptimumToAMillionth) {
       const JointSummary summary =
           SolveJoint(scene.problem, Options(norm()), {}, &scene.estimate);
       ExpectCertified(scene.problem, norm(), scene.estimate, summary);
-      EXPECT_EQ(summary.num_components, 1);
     }
   }
 }
@@ -199,7 +198,7 @@ TEST_P(SolveJointTest, HasTheSameBitsAtAnyNumberOfThreads) {
     Estimate estimate = scene.estimate;
     const JointSummary summary =
         SolveJoint(scene.problem, options, {num_threads}, &estimate);
-    EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+    EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
     if (!expected) {
       expected = estimate;
       expected_bound = summary.lower_bound;
@@ -267,7 +266,7 @@ TEST(SolveJoint, StopsAtMaxIterations) {
   options.max_iterations = 1;
   const JointSummary summary =
       SolveJoint(scene.problem, options, {}, &scene.estimate);
-  EXPECT_EQ(summary.termination, JointTermination::kMaxIterations);
+  EXPECT_EQ(summary.termination, SolveTermination::kMaxIterations);
   EXPECT_EQ(summary.iterations.size(), 1u);
   EXPECT_LE(summary.cost_final, summary.cost_initial);
   EXPECT_EQ(summary.cost_final,
@@ -286,7 +285,7 @@ TEST(SolveJoint, KeepsWhatItHasWhenInterrupted) {
     Estimate estimate = scene.estimate;
     const JointSummary summary =
         SolveJoint(scene.problem, options, context, &estimate);
-    EXPECT_EQ(summary.termination, JointTermination::kInterrupted);
+    EXPECT_EQ(summary.termination, SolveTermination::kInterrupted);
     EXPECT_EQ(static_cast<int>(summary.iterations.size()), last);
     EXPECT_LE(summary.cost_final, summary.cost_initial);
     EXPECT_EQ(summary.cost_final, Cost(scene.problem, estimate, Norm::L2(), 1));
@@ -304,7 +303,7 @@ TEST(SolveJoint, IsThereSoonFromStartsThatHugTheBoundary) {
     Estimate estimate = HugTheBoundary(scene, options.norm);
     const JointSummary summary =
         SolveJoint(scene.problem, options, {}, &estimate);
-    EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+    EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
     EXPECT_LE(summary.iterations.size(), 100u);
     num_iterations += summary.iterations.size();
   }
@@ -330,7 +329,7 @@ TEST(SolveJoint, ReportsAFreshStartAndItsInterruption) {
     };
     const JointSummary summary =
         SolveJoint(scene.problem, options, context, &estimate);
-    EXPECT_EQ(summary.termination == JointTermination::kInterrupted,
+    EXPECT_EQ(summary.termination == SolveTermination::kInterrupted,
               is_cancelled);
     EXPECT_EQ(summary.iterations.back().target.has_value(), is_cancelled);
     EXPECT_LE(summary.cost_final, summary.cost_initial);
@@ -345,7 +344,7 @@ TEST(SolveJoint, OfNothingIsDone) {
   Estimate estimate;
   const JointSummary summary =
       SolveJoint(problem, Options(Norm::L2()), {}, &estimate);
-  EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+  EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
   EXPECT_EQ(summary.num_components, 0);
   EXPECT_EQ(summary.cost_final, 0);
 }

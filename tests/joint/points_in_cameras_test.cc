@@ -64,7 +64,7 @@ TEST(SolveJoint, LeavesPointsInCamerasWithinSixtyIterations) {
     Estimate estimate = scene.estimate;
     const JointSummary summary =
         SolveJoint(scene.problem, options, {}, &estimate);
-    EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+    EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
     EXPECT_LE(summary.iterations.size(), 60u);
     ASSERT_TRUE(summary.certificate);
     const CertificateCheck check =

@@ -195,7 +195,7 @@ TEST(WorkingSet, OfFewPointsHasTheOptimumOfAll) {
     options.relative_gap = 1e-6;
     const JointSummary summary =
         SolveJoint(scene.problem, options, {}, &scene.estimate);
-    EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+    EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
     EXPECT_LT(4 * summary.num_working_observations,
               3 * static_cast<int64_t>(scene.problem.observations.size()));
     ASSERT_TRUE(summary.certificate);

@@ -62,7 +62,7 @@ TEST(PackAgainstRemoval, EndsWithTheConflictsSoFarWhereItsWorkIsUsedUp) {
     return PackAgainstRemoval(scene.model, built, bound, removal, {},
                               Context{num_threads}, work_per_observation);
   };
-  const ConflictPacking whole = pack(kMostWork, 2);
+  const ConflictPacking whole = pack(1500, 2);
   EXPECT_TRUE(whole.is_complete);
   const ConflictPacking part = pack(1, 1);
   EXPECT_FALSE(part.is_complete);

@@ -1,4 +1,4 @@
-#include "krot/outliers/filter_steps.h"
+#include "krot/outliers/outlier_filter.h"
 
 #include <set>
 

@@ -1,4 +1,4 @@
-#include "krot/pipeline/pixel_proof.h"
+#include "krot/pipeline/stages.h"
 
 #include <vector>
 
@@ -37,22 +37,22 @@ TEST(ProveRows, RepairsTheMultipliersOfALargeSupportForNewRows) {
   MinimizeJointly(built.problem, options, {}, &estimate, &multipliers);
   const double cost = reprojection.TrueCost(estimate, norm, 1);
   const double sufficient = 0.97 * cost;
-  CertificateSearch search(built.problem, norm, {sufficient}, {});
-  search.TryAll(estimate, multipliers);
-  ASSERT_TRUE(search.best());
-  ASSERT_GT(search.best()->observations.size(), 20000U);
+  const std::optional<Certificate> found = RepairCertificate(
+      built.problem, norm, estimate, multipliers, {sufficient}, {});
+  ASSERT_TRUE(found);
+  ASSERT_GT(found->observations.size(), 20000U);
   Context threads;
   threads.num_threads = 3;
-  CertificateSearch again(built.problem, norm, {sufficient}, threads);
-  again.TryAll(estimate, multipliers);
-  ASSERT_TRUE(again.best());
-  EXPECT_EQ(again.best()->lower_bound, search.best()->lower_bound);
+  const std::optional<Certificate> again = RepairCertificate(
+      built.problem, norm, estimate, multipliers, {sufficient}, threads);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->lower_bound, found->lower_bound);
 
   reprojection.TakeRows(estimate, 1, &built.problem);
   SolveModelOptions solve;
   solve.norm = norm;
-  const std::optional<PixelCertificate> proof = ProveRows(
-      model, built, estimate, solve, {*search.best(), {}}, sufficient, {});
+  const std::optional<PixelCertificate> proof =
+      ProveRows(model, built, estimate, solve, {*found, {}}, sufficient, {});
   ASSERT_TRUE(proof);
   const PixelCertificateCheck check =
       CheckPixelCertificate(model, built, norm, *proof, {});

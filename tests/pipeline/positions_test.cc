@@ -18,8 +18,8 @@
 #include "krot/convert/reprojection.h"
 #include "krot/model/derived_models.h"
 #include "krot/model/rigs.h"
-#include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/solve_model.h"
+#include "krot/pipeline/stages.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {

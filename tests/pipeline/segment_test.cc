@@ -1,9 +1,8 @@
-#include "krot/pipeline/trust_regions.h"
-
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
+#include "krot/pipeline/rounds.h"
 #include "krot/problem/cost.h"
 #include "tests/convert/lens_model.h"
 

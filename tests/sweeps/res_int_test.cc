@@ -114,7 +114,7 @@ TEST_P(ResIntTest, SaysStalledOnlyAfterIdleSweeps) {
   options.max_sweeps = 1000;
   const ResIntSummary summary =
       SolveResInt(scene.problem, options, {}, &scene.estimate);
-  EXPECT_EQ(summary.termination, ResIntTermination::kStalled);
+  EXPECT_EQ(summary.termination, SolveTermination::kStalled);
   const size_t patience = GetParam() == FastDescentSettings::kPaper ? 1 : 3;
   const size_t n = summary.sweeps.size();
   ASSERT_GT(n, patience);
@@ -130,7 +130,7 @@ TEST_P(ResIntTest, SaysMaxSweepsAfterSoMany) {
   options.max_sweeps = 2;
   const ResIntSummary summary =
       SolveResInt(scene.problem, options, {}, &scene.estimate);
-  EXPECT_EQ(summary.termination, ResIntTermination::kMaxSweeps);
+  EXPECT_EQ(summary.termination, SolveTermination::kMaxSweeps);
   EXPECT_EQ(summary.sweeps.size(), 2u);
 }
 
@@ -141,7 +141,7 @@ TEST_P(ResIntTest, NoSweepsChangeNothing) {
   Estimate estimate = scene.estimate;
   const ResIntSummary summary =
       SolveResInt(scene.problem, options, {}, &estimate);
-  EXPECT_EQ(summary.termination, ResIntTermination::kMaxSweeps);
+  EXPECT_EQ(summary.termination, SolveTermination::kMaxSweeps);
   EXPECT_EQ(summary.cost_final, summary.cost_initial);
   EXPECT_TRUE(summary.sweeps.empty());
   ExpectSameBits(estimate, scene.estimate);
@@ -154,7 +154,7 @@ TEST_P(ResIntTest, InterruptionKeepsTheBestSoFar) {
   options.callback = [&](int sweep, const Sweep&) { cancel = sweep == 2; };
   const ResIntSummary summary =
       SolveResInt(scene.problem, options, {1, &cancel}, &scene.estimate);
-  EXPECT_EQ(summary.termination, ResIntTermination::kInterrupted);
+  EXPECT_EQ(summary.termination, SolveTermination::kInterrupted);
   ASSERT_EQ(summary.sweeps.size(), 2u);
   EXPECT_NEAR(summary.cost_final, summary.sweeps.back().cost, kCostRounding);
   EXPECT_EQ(Cost(scene.problem, scene.estimate, Norm::L2(), 1),

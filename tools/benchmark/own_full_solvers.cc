@@ -53,7 +53,7 @@ class Sweeps : public KnownRotationSolver {
     options.sweep_tolerance = 1e-3;  // the paper's
     const ResIntSummary summary =
         SolveResInt(problem, options, {num_threads_, cancel}, estimate);
-    return summary.termination != ResIntTermination::kInterrupted;
+    return summary.termination != SolveTermination::kInterrupted;
   }
 
  private:

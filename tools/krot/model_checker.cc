@@ -8,7 +8,7 @@
 #include "krot/check.h"
 #include "krot/convert/baseline_certificate.h"
 #include "krot/database.h"
-#include "krot/outliers/filter_steps.h"
+#include "krot/outliers/outlier_filter.h"
 #include "krot/report/reports.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"

@@ -6,7 +6,6 @@
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"
 #include "krot/options/command_options.h"
-#include "krot/outliers/filter_steps.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/report/reports.h"
 #include "krot/report/text_table.h"

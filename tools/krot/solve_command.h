@@ -3,7 +3,7 @@
 #include <functional>
 #include <string>
 
-#include "krot/outliers/filter_steps.h"
+#include "krot/outliers/outlier_filter.h"
 #include "tools/krot/checkpoint.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"

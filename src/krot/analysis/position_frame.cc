@@ -11,7 +11,6 @@
 #include "krot/base/numbers.h"
 #include "krot/context.h"
 #include "krot/geometry/transform.h"
-#include "krot/model/pose_priors.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {

@@ -13,31 +13,6 @@
 namespace krot::internal {
 namespace {
 
-// The first mu, relative to the cost by pair of slack and multiplier. It is
-// large, as the start is near the boundary and has to leave it first.
-constexpr double kStartWeight = 10;
-// The first multipliers are those of slacks of at least this share of the
-// cap's. With smaller ones the slack could only double in a step.
-constexpr double kStartSlack = 0.01;
-// Fraction to the boundary. After a longer step the next direction could not
-// predict the slacks.
-constexpr double kDamping = 0.95;
-// Products of slack and multiplier stay between these multiples of mu. With
-// less, a multiplier may be too small to keep its error off the cap in the next
-// step, and a single pair holds back the step of all.
-constexpr double kLeastProduct = 0.3;
-constexpr double kLargestProduct = 1e5;
-// It ends after so many steps in a row that are shorter than kIdleStep and gain
-// less than kLeastGain times the gap asked for, when the gap is at most
-// kNearGap times that: lenses near their fold follow no linear row far.
-constexpr double kIdleStep = 0.1;
-constexpr double kNearGap = 10;
-constexpr double kLeastGain = 0.01;
-constexpr int kPatience = 3;
-constexpr double kLeastSigma = 0.03;
-// mu does not fall below this share of what the gap asked for needs.
-constexpr double kLastShare = 0.5;
-
 // One run along the central path: the minima of
 //
 //   1/2 sum rho - mu sum log(h_j(e) / h_j(0))
@@ -73,7 +48,10 @@ class BoundedPath {
       return summary_;
     }
     summary_.cost_initial = now_.cost;
-    CentreMultipliers(MuOf(kStartWeight), kStartSlack);
+    // The first mu is large, as the start is near the boundary and has to leave
+    // it first. With multipliers of slacks below a hundredth of the cap's, the
+    // slack could only double in a step.
+    CentreMultipliers(MuOf(/*relative_gap=*/10), /*least_slack=*/0.01);
     summary_.termination = FollowPath(context_, options_.max_iterations, this,
                                       &summary_.iterations);
     summary_.cost_final = now_.cost;
@@ -104,9 +82,9 @@ class BoundedPath {
     if (step < kShortStep) return system_.Solve(mu_);
     system_.Solve(0);
     const double sigma =
-        MehrotraSigma(system_.PredictedGap() / (Count() * mu_), kLeastSigma);
-    target_mu_ =
-        std::max(MuOf(kLastShare * options_.gap_tolerance), sigma * mu_);
+        MehrotraSigma(system_.PredictedGap() / (Count() * mu_), 0.03);
+    // Not below half of what the gap asked for needs.
+    target_mu_ = std::max(MuOf(options_.gap_tolerance / 2), sigma * mu_);
     system_.Correct(target_mu_);
   }
 
@@ -114,8 +92,10 @@ class BoundedPath {
     const double before = BarrierCost(now_, target_mu_);
     const double highest =
         before + kCostRounding * (now_.cost + target_mu_ * Count());
+    // After a longer step to the boundary the next direction could not predict
+    // the slacks.
     const auto search = [&] {
-      return Backtrack(system_.MaxStep(kDamping),
+      return Backtrack(system_.MaxStep(/*damping=*/0.95),
                        [&](double step) { return TryStep(step, highest); });
     };
     double step = search();
@@ -135,17 +115,18 @@ class BoundedPath {
     return true;
   }
 
+  // It ends after three short steps in a row that gain next to nothing, near
+  // the gap asked for: lenses near their fold follow no linear row far.
   std::optional<InteriorPointTermination> Report(int iteration, double step) {
     is_centred_ = false;
     if (options_.callback) {
       options_.callback({iteration, now_.cost, RelativeGap(), step});
     }
-    const bool is_idle =
-        step < kIdleStep &&
-        gain_ < kLeastGain * options_.gap_tolerance * now_.cost &&
-        *summary_.duality_gap <= kNearGap * options_.gap_tolerance;
+    const bool is_idle = step < 0.1 &&
+                         gain_ < 0.01 * options_.gap_tolerance * now_.cost &&
+                         *summary_.duality_gap <= 10 * options_.gap_tolerance;
     num_idle_ = is_idle ? num_idle_ + 1 : 0;
-    if (num_idle_ == kPatience) return InteriorPointTermination::kNoProgress;
+    if (num_idle_ == 3) return InteriorPointTermination::kNoProgress;
     return std::nullopt;
   }
 
@@ -235,15 +216,17 @@ class BoundedPath {
     return true;
   }
 
-  // Moves the multipliers to the slacks of trial_.
+  // Moves the multipliers to the slacks of trial_. Their products stay between
+  // multiples of mu. With less, a multiplier may be too small to keep its error
+  // off the cap in the next step, and a single pair holds back the step of all.
   void MoveMultipliers() {
     const double gap = system_.loop().Sum([&](int64_t i) {
       Vector& l = multipliers_[i];
       const Vector h = system_.cap().Slacks(trial_.viewed[i].e);
       const Vector centred = target_mu_ * h.cwiseInverse();
       l = (l + system_.StepOf(i).dl)
-              .cwiseMax(kLeastProduct * centred)
-              .cwiseMin(kLargestProduct * centred);
+              .cwiseMax(0.3 * centred)
+              .cwiseMin(1e5 * centred);
       return l.dot(h);
     });
     mu_ = gap / Count();

@@ -230,9 +230,6 @@ class BoundedSystem {
   const Cap& cap() const { return cap_; }
 
  private:
-  // The relative error of a direction in the energy norm. The next step corrects
-  // it.
-  static constexpr double kTolerance = 1e-3;
   // Longer steps are not looked at.
   static constexpr double kFurthest = 2;
 
@@ -317,7 +314,8 @@ class BoundedSystem {
     });
     // A rank may have no observation.
     double* const rows = d_.empty() ? nullptr : d_[0].data();
-    least_squares_.Solve(nullptr, rows, kTolerance, &dx_, rows);
+    // The next step corrects the direction's error in the energy norm.
+    least_squares_.Solve(nullptr, rows, /*tolerance=*/1e-3, &dx_, rows);
     loop_.ForEach([&](int64_t i) {
       Vector3d& d = d_[i];
       const Root& U = root_[i];

@@ -29,43 +29,23 @@ struct ErrorLoss {
 
   double Value(double s) const {
     const double b = scale * scale;
-    switch (kind) {
-      case Kind::kTrivial:
-        break;
-      case Kind::kHuber:
-        return s <= b ? s : 2 * scale * std::sqrt(s) - b;
-      case Kind::kCauchy:
-        return b * std::log1p(s / b);
-    }
-    return s;
+    if (kind == Kind::kHuber && s > b) return 2 * scale * std::sqrt(s) - b;
+    return kind == Kind::kCauchy ? b * std::log1p(s / b) : s;
   }
 
   // rho'(s), in (0, 1].
   double Weight(double s) const {
     const double b = scale * scale;
-    switch (kind) {
-      case Kind::kTrivial:
-        break;
-      case Kind::kHuber:
-        return s <= b ? 1 : scale / std::sqrt(s);
-      case Kind::kCauchy:
-        return 1 / (1 + s / b);
-    }
-    return 1;
+    if (kind == Kind::kHuber && s > b) return scale / std::sqrt(s);
+    return kind == Kind::kCauchy ? 1 / (1 + s / b) : 1;
   }
 };
 
 // The names that --Solver.finish_loss takes: "trivial", "huber", "cauchy".
 inline const char* LossName(ErrorLoss::Kind kind) {
-  switch (kind) {
-    case ErrorLoss::Kind::kHuber:
-      return "huber";
-    case ErrorLoss::Kind::kCauchy:
-      return "cauchy";
-    case ErrorLoss::Kind::kTrivial:
-      break;
-  }
-  return "trivial";
+  return kind == ErrorLoss::Kind::kHuber    ? "huber"
+         : kind == ErrorLoss::Kind::kCauchy ? "cauchy"
+                                            : "trivial";
 }
 
 // An iterate; every one of them is below the cap.

@@ -13,16 +13,8 @@
 namespace krot::internal {
 namespace {
 
-constexpr int kMaxSteps = 30;
-constexpr int kMaxTries = 8;  // of one step
 // The last c, relative to the median.
 constexpr double kFactor = 2;
-constexpr double kLeastFall = 3e-4;
-constexpr double kLeastDamping = 1e-3;
-// Of a step's linear solve: the linear model does not hold far from here.
-constexpr double kTolerance = 1e-2;
-// In pixels: a smaller scale would be that of rounding.
-constexpr double kLeastScale = 1e-6;
 
 class RobustLeastSquares {
  public:
@@ -39,14 +31,36 @@ class RobustLeastSquares {
         target_(3 * problem.observations.size()),
         estimate_(*estimate) {}
 
-  void Run();
+  void Run() {
+    squared_errors_ = SquaredErrors(estimate_);
+    if (squared_errors_.empty()) return;
+    TakeScale();
+    // If fewer than half of the points are seen, there is no scale.
+    const int max_steps = 30;
+    for (int n = 0; n < max_steps && std::isfinite(scale2_); ++n) {
+      context_.Stage("improving the start, step", n + 1, max_steps);
+      if (context_.IsCancelled() || !TakeStep()) break;
+    }
+  }
 
  private:
   // r_i^2; infinite where the point is not seen.
-  std::vector<double> SquaredErrors(const Estimate& estimate) const;
-  void TakeScale() {
+  std::vector<double> SquaredErrors(const Estimate& estimate) const {
+    const std::vector<AffineMap> cameras =
+        CamerasFromWorld(problem_, estimate.translations);
+    std::vector<double> squared(problem_.observations.size());
+    loop_.ForEach([&](int64_t i) {
+      const Observation& o = problem_.observations[i];
+      const double error = ResidualOf(
+          ViewPoint(cameras[o.view], o, estimate.points[o.point]), Norm::L2());
+      squared[i] = error * error;
+    });
+    return squared;
+  }
+
+  void TakeScale() {  // a scale below 1e-6 pixels would be that of rounding
     scale2_ = std::pow(
-        std::max(kLeastScale, factor_ * std::sqrt(Median(squared_errors_))), 2);
+        std::max(1e-6, factor_ * std::sqrt(Median(squared_errors_))), 2);
   }
   double Cost(const std::vector<double>& squared_errors) const {
     return loop_.Sum([&](int64_t i) {
@@ -55,9 +69,71 @@ class RobustLeastSquares {
                  : scale2_;
     });
   }
-  void Linearize();
-  bool FindStep();
-  bool TakeStep();
+
+  // The rows of every observation, sqrt(weight) times (dr; damping dw / w).
+  void Linearize() {
+    using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    const std::vector<AffineMap> cameras =
+        CamerasFromWorld(problem_, estimate_.translations);
+    const double damping = damping_ * std::sqrt(scale2_);
+    loop_.ForEach([&](int64_t i) {
+      Eigen::Map<Rows> rows(least_squares_.rows(i));
+      Eigen::Map<Eigen::Vector3d> target(&target_[3 * i]);
+      rows.setZero();
+      target.setZero();
+      if (!std::isfinite(squared_errors_[i])) return;
+      const Observation& o = problem_.observations[i];
+      const View& view = problem_.views[o.view];
+      const ViewedPoint viewed =
+          ViewPoint(cameras[o.view], o, estimate_.points[o.point]);
+      const double root_weight = scale2_ / (scale2_ + squared_errors_[i]);
+      const Eigen::Vector2d r = viewed.v / viewed.depth;
+      Rows by_x_cam;
+      by_x_cam.topRows<2>() = o.E.bottomRows<2>() - r * o.E.row(0);
+      by_x_cam.row(2) = damping * o.E.row(0);
+      rows =
+          root_weight / viewed.depth * by_x_cam * view.cam_from_world_rotation;
+      target.head<2>() = -root_weight * r;
+    });
+  }
+
+  bool FindStep() {
+    Linearize();
+    if (!least_squares_.Factorize()) return false;
+    // The linear model does not hold far from here.
+    least_squares_.Solve(nullptr, target_.data(), /*tolerance=*/1e-2, &step_,
+                         nullptr);
+    // A point that no observation sees has no rows, and stays.
+    for (Eigen::Vector3d& s : step_.points) {
+      if (!s.allFinite()) s.setZero();
+    }
+    return std::all_of(step_.frames.begin(), step_.frames.end(),
+                       [](const Eigen::Vector3d& c) { return c.allFinite(); });
+  }
+
+  // Takes a step. Returns whether the sum fell by enough to go on.
+  bool TakeStep() {
+    const double before = Cost(squared_errors_);
+    Estimate moved = estimate_;
+    for (int n = 0; n < 8 && !context_.IsCancelled(); ++n) {
+      if (FindStep()) {
+        MoveCentres(rig_from_world_, estimate_, 1, step_, &moved);
+        std::vector<double> squared_errors = SquaredErrors(moved);
+        const double after = Cost(squared_errors);
+        if (after < before) {
+          damping_ = std::max(1e-3, damping_ / 4);
+          estimate_ = std::move(moved);
+          squared_errors_ = std::move(squared_errors);
+          const bool is_wide = factor_ > kFactor;
+          factor_ = std::max(kFactor, factor_ / 2);
+          TakeScale();
+          return is_wide || after < (1 - 3e-4) * before;
+        }
+      }
+      damping_ *= 4;
+    }
+    return false;
+  }
 
   const KnownRotationProblem& problem_;
   const Context& context_;
@@ -73,93 +149,6 @@ class RobustLeastSquares {
   double damping_ = 1;                  // in units of c
   BlockVector step_;
 };
-
-std::vector<double> RobustLeastSquares::SquaredErrors(
-    const Estimate& estimate) const {
-  const std::vector<AffineMap> cameras =
-      CamerasFromWorld(problem_, estimate.translations);
-  std::vector<double> squared(problem_.observations.size());
-  loop_.ForEach([&](int64_t i) {
-    const Observation& o = problem_.observations[i];
-    const double error = ResidualOf(
-        ViewPoint(cameras[o.view], o, estimate.points[o.point]), Norm::L2());
-    squared[i] = error * error;
-  });
-  return squared;
-}
-
-// The rows of every observation, sqrt(weight) times (dr; damping dw / w).
-void RobustLeastSquares::Linearize() {
-  using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const std::vector<AffineMap> cameras =
-      CamerasFromWorld(problem_, estimate_.translations);
-  const double damping = damping_ * std::sqrt(scale2_);
-  loop_.ForEach([&](int64_t i) {
-    Eigen::Map<Rows> rows(least_squares_.rows(i));
-    Eigen::Map<Eigen::Vector3d> target(&target_[3 * i]);
-    rows.setZero();
-    target.setZero();
-    if (!std::isfinite(squared_errors_[i])) return;
-    const Observation& o = problem_.observations[i];
-    const View& view = problem_.views[o.view];
-    const ViewedPoint viewed =
-        ViewPoint(cameras[o.view], o, estimate_.points[o.point]);
-    const double root_weight = scale2_ / (scale2_ + squared_errors_[i]);
-    const Eigen::Vector2d r = viewed.v / viewed.depth;
-    Rows by_x_cam;
-    by_x_cam.topRows<2>() = o.E.bottomRows<2>() - r * o.E.row(0);
-    by_x_cam.row(2) = damping * o.E.row(0);
-    rows = root_weight / viewed.depth * by_x_cam * view.cam_from_world_rotation;
-    target.head<2>() = -root_weight * r;
-  });
-}
-
-bool RobustLeastSquares::FindStep() {
-  Linearize();
-  if (!least_squares_.Factorize()) return false;
-  least_squares_.Solve(nullptr, target_.data(), kTolerance, &step_, nullptr);
-  // A point that no observation sees has no rows, and stays.
-  for (Eigen::Vector3d& s : step_.points) {
-    if (!s.allFinite()) s.setZero();
-  }
-  return std::all_of(step_.frames.begin(), step_.frames.end(),
-                     [](const Eigen::Vector3d& c) { return c.allFinite(); });
-}
-
-// Takes a step. Returns whether the sum fell by enough to go on.
-bool RobustLeastSquares::TakeStep() {
-  const double before = Cost(squared_errors_);
-  Estimate moved = estimate_;
-  for (int n = 0; n < kMaxTries && !context_.IsCancelled(); ++n) {
-    if (FindStep()) {
-      MoveCentres(rig_from_world_, estimate_, 1, step_, &moved);
-      std::vector<double> squared_errors = SquaredErrors(moved);
-      const double after = Cost(squared_errors);
-      if (after < before) {
-        damping_ = std::max(kLeastDamping, damping_ / 4);
-        estimate_ = std::move(moved);
-        squared_errors_ = std::move(squared_errors);
-        const bool is_wide = factor_ > kFactor;
-        factor_ = std::max(kFactor, factor_ / 2);
-        TakeScale();
-        return is_wide || after < (1 - kLeastFall) * before;
-      }
-    }
-    damping_ *= 4;
-  }
-  return false;
-}
-
-void RobustLeastSquares::Run() {
-  squared_errors_ = SquaredErrors(estimate_);
-  if (squared_errors_.empty()) return;
-  TakeScale();
-  // If fewer than half of the points are seen, there is no scale.
-  for (int n = 0; n < kMaxSteps && std::isfinite(scale2_); ++n) {
-    context_.Stage("improving the start, step", n + 1, kMaxSteps);
-    if (context_.IsCancelled() || !TakeStep()) break;
-  }
-}
 
 }  // namespace
 

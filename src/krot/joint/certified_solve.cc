@@ -12,50 +12,13 @@
 namespace krot::internal {
 namespace {
 
-// `take` is called when the interior point's own gap is this small, and again
-// whenever it has fallen by the factor below.
-constexpr double kFirstGapToAsk = 0.1;
-constexpr double kGapBetweenQuestions = 0.1;
-// A certificate is tried once the interior point's own gap is as small as the
-// one asked for, and again whenever it has fallen by this factor.
-constexpr double kGapBetweenCertificates = 0.3;
-// The interior point ends at this share of the gap asked for. Below this gap, a
-// missing proof is not the interior point's fault.
-constexpr double kFarBelow = 1e-2;
-// Iterations after which a start is given up if the gap is still large. Most
-// models take 10 to 50 in all; a start whose points hug the boundary of the
-// cones can hold the interior point back for hundreds.
-constexpr int kIterationsPerStart = 60;
+// The interior point's relative gap above which it is far from its optimum.
 constexpr double kLargeGap = 0.1;
-// If the gap does not halve within this many iterations, the start is given up.
-constexpr int kPatience = 30;
-constexpr int kWarmPatience = 15;
-// A fresh start is found by bisection to this width, relative to the cost; the
-// next bisection goes to a share of that width.
-constexpr double kFirstWidth = 1e-2;
-constexpr double kShareOfWidth = 0.25;
-// Start margins: how far above the cost gamma starts, relative. A warm start's
-// is proportional to its distance from the known optimum, within limits.
+// Start margins: how far above the cost gamma starts, relative. The fresh
+// start's is also how far above the cost an estimate may be that is to replace
+// one with points in cameras.
 constexpr double kStartMargin = 0.1;
-constexpr double kWarmMarginOfDistance = 0.06;
-constexpr double kLargestWarmMargin = 3e-3;
-constexpr double kLeastWarmMargin = 1e-3;
-// A known optimum farther from the cost than this, relative, is that of another
-// problem: of another component, or of positions' rows at another level.
-constexpr double kFarFromKnown = 0.5;
-constexpr double kFarMargin = 0.03;
-// Start margin of a fresh start. Also how far above the cost an estimate may be
-// that is to replace one with points in cameras.
 constexpr double kFreshStartMargin = 1e-3;
-// Depths below this, relative to the median, mean that a point is in a camera.
-constexpr double kDepthInCamera = 1e-6;
-// FeasibleStartOptions::unit_depth, relative to the median depth.
-constexpr double kUnitDepth = 0.1;
-constexpr double kHopelessGap = 1e-5;
-// A fresh start is sought this share of the gap asked for below the cost.
-constexpr double kShareOfGapBelow = 0.5;
-// The proof of a bound lowers it by at most this, relative.
-constexpr double kProofLoss = 1e-3;
 
 CertificateOptions Sufficient(double bound) {
   CertificateOptions options;
@@ -72,7 +35,7 @@ bool HasPointsInCameras(const KnownRotationProblem& problem,
     smallest =
         std::min(smallest, ViewPoint(problem, observation, estimate).depth);
   }
-  return smallest < kDepthInCamera * MedianDepth(problem, estimate);
+  return smallest < 1e-6 * MedianDepth(problem, estimate);
 }
 
 CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
@@ -92,12 +55,13 @@ CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
       known_optimum_(known_optimum) {}
 
 // The start margin of a warm start: the farther the start seems to be from its
-// optimum, the more.
+// optimum, the more. A known optimum that is very far from the cost is that of
+// another problem: of another component, or of positions' rows at another
+// level.
 double CertifiedSolve::WarmMargin() const {
   const double distance = std::abs(1 - known_optimum_ / cost_);
-  if (distance > kFarFromKnown) return kFarMargin;
-  return std::clamp(kWarmMarginOfDistance * distance, kLeastWarmMargin,
-                    kLargestWarmMargin);
+  if (distance > 0.5) return 0.03;
+  return std::clamp(0.06 * distance, 1e-3, 3e-3);
 }
 
 void CertifiedSolve::Adopt(std::optional<Certificate> certificate) {
@@ -110,6 +74,15 @@ void CertifiedSolve::Adopt(std::optional<Certificate> certificate) {
   }
 }
 
+// Runs the interior point. `take` is called when its own gap is a tenth, and
+// again whenever it has fallen by ten. A certificate is tried once the gap is
+// as small as the one asked for, and again whenever it has fallen to 0.3 of
+// that. The run ends far below: there, a missing proof is not its fault.
+//
+// The start is given up if the gap does not halve within some iterations, or is
+// still large after many. Most models take 10 to 50 in all; a start whose
+// points hug the boundary of the cones can hold the interior point back for
+// hundreds.
 InteriorPointTermination CertifiedSolve::RunFrom(
     Estimate start, double start_margin, const TakeEstimate& take,
     const IterationReport& report) {
@@ -117,11 +90,11 @@ InteriorPointTermination CertifiedSolve::RunFrom(
   options.norm = options_.norm;
   options.start_margin = start_margin;
   if (are_multipliers_known_) options.known_multipliers = &multipliers_;
-  const int patience = are_multipliers_known_ ? kWarmPatience : kPatience;
+  const int patience = are_multipliers_known_ ? 15 : 30;
   options.max_iterations = std::max(1, max_iterations_ - iterations_);
-  options.smallest_gap = kFarBelow * options_.relative_gap;
+  options.smallest_gap = 1e-2 * options_.relative_gap;
   double next_gap = options_.relative_gap;
-  double gap_to_ask = kFirstGapToAsk;
+  double gap_to_ask = 0.1;
   double milestone = std::numeric_limits<double>::infinity();
   int milestone_iteration = 0;
   options.stop = [&](const ConicIterate& iterate) {
@@ -132,14 +105,14 @@ InteriorPointTermination CertifiedSolve::RunFrom(
     }
     if (iterate.gap <= std::max(next_gap, gap_to_ask)) {
       is_given_up_ = !take(estimate_);
-      while (gap_to_ask >= iterate.gap) gap_to_ask *= kGapBetweenQuestions;
+      while (gap_to_ask >= iterate.gap) gap_to_ask *= 0.1;
     }
     if (iterate.gap <= next_gap && !is_given_up_) {
       Adopt(MakeCertificate(problem_, options_.norm, *iterate.estimate,
                             iterate.gamma, *iterate.multipliers,
                             Sufficient((1 - options_.relative_gap) * cost_),
                             context_));
-      next_gap = kGapBetweenCertificates * iterate.gap;
+      next_gap = 0.3 * iterate.gap;
     }
     gap_ = iterate.gap;
     if (gap_ < milestone / 2) {
@@ -151,8 +124,7 @@ InteriorPointTermination CertifiedSolve::RunFrom(
     report(iteration);
     return is_given_up_ || IsGapReached() ||
            iterate.iteration >= milestone_iteration + patience ||
-           (iterate.iteration >= kIterationsPerStart &&
-            iterate.gap > kLargeGap);
+           (iterate.iteration >= 60 && iterate.gap > kLargeGap);
   };
   return MinimizeJointly(problem_, options, context_, &start, &multipliers_)
       .termination;
@@ -162,9 +134,9 @@ FeasibleStartOptions CertifiedSolve::OptionsForStart(
     const IterationReport& report) {
   FeasibleStartOptions options;
   options.norm = options_.norm;
-  options.unit_depth = kUnitDepth * MedianDepth(problem_, estimate_);
+  options.unit_depth = 0.1 * MedianDepth(problem_, estimate_);
   options.known_bound = lower_bound_;
-  options.hopeless_gap = kHopelessGap;
+  options.hopeless_gap = 1e-5;
   options.callback = [this, &report](double target) {
     ++iterations_;
     JointIteration iteration;
@@ -200,8 +172,9 @@ bool CertifiedSolve::TryBelow(double bound, const IterationReport& report) {
     cost_ = Cost(problem_, estimate_, options_.norm, context_.num_threads);
     return true;
   }
+  // A proof lowers the bound by a thousandth at most.
   const double sufficient =
-      std::min((1 - kProofLoss) * bound, (1 - options_.relative_gap) * cost_);
+      std::min((1 - 1e-3) * bound, (1 - options_.relative_gap) * cost_);
   Adopt(MakeInfeasibilityCertificate(problem_, options_.norm, bound,
                                      multipliers, Sufficient(sufficient),
                                      context_));
@@ -228,42 +201,42 @@ bool CertifiedSolve::Bisect(double width, const IterationReport& report) {
 
 // Returns whether there is a new estimate. First tries to find one just below
 // the cost, or to prove that there is none. Bisects if neither succeeds, or if
-// the last estimate found in this way did not lead to a clearly lower cost.
+// the last estimate found in this way did not lead to a clearly lower cost. The
+// next bisection goes to a quarter of the width.
 bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
   const bool has_led_lower = cost_ < (1 - width_) * fresh_cost_;
   if (has_led_lower &&
-      TryBelow((1 - kShareOfGapBelow * options_.relative_gap) * cost_,
-               report)) {
+      TryBelow((1 - options_.relative_gap / 2) * cost_, report)) {
     fresh_cost_ = cost_;
     return true;
   }
   if (IsGapReached()) return false;
   const bool is_fresh = Bisect(width_, report);
-  width_ *= kShareOfWidth;
+  width_ /= 4;
   fresh_cost_ = std::numeric_limits<double>::infinity();
   return is_fresh;
 }
 
-JointTermination CertifiedSolve::Run(int max_iterations,
+SolveTermination CertifiedSolve::Run(int max_iterations,
                                      const TakeEstimate& take,
                                      const IterationReport& report) {
   max_iterations_ = max_iterations;
-  width_ = kFirstWidth;
+  width_ = 1e-2;
   fresh_cost_ = std::numeric_limits<double>::infinity();
-  if (IsLowEnough()) return JointTermination::kGapReached;
+  if (options_.IsLowEnough(cost_)) return SolveTermination::kGapReached;
   double start_margin = are_multipliers_known_ ? WarmMargin() : kStartMargin;
   Estimate start = estimate_;
   if (LeaveCameras(report, &start)) start_margin = kFreshStartMargin;
   for (;;) {
     const InteriorPointTermination termination =
         RunFrom(start, start_margin, take, report);
-    if (IsGapReached()) return JointTermination::kGapReached;
-    if (is_given_up_) return JointTermination::kStalled;
+    if (IsGapReached()) return SolveTermination::kGapReached;
+    if (is_given_up_) return SolveTermination::kStalled;
     if (termination == InteriorPointTermination::kInterrupted) {
-      return JointTermination::kInterrupted;
+      return SolveTermination::kInterrupted;
     }
     if (iterations_ >= max_iterations_) {
-      return JointTermination::kMaxIterations;
+      return SolveTermination::kMaxIterations;
     }
     if (std::exchange(are_multipliers_known_, false) && gap_ > kLargeGap) {
       start_margin = kStartMargin;  // once more, without a warm start
@@ -271,12 +244,12 @@ JointTermination CertifiedSolve::Run(int max_iterations,
     }
     start_margin = kFreshStartMargin;
     const bool is_fresh = FindFreshStart(report);
-    if (IsGapReached()) return JointTermination::kGapReached;
-    if (context_.IsCancelled()) return JointTermination::kInterrupted;
+    if (IsGapReached()) return SolveTermination::kGapReached;
+    if (context_.IsCancelled()) return SolveTermination::kInterrupted;
     if (iterations_ >= max_iterations_) {
-      return JointTermination::kMaxIterations;
+      return SolveTermination::kMaxIterations;
     }
-    if (!is_fresh) return JointTermination::kStalled;
+    if (!is_fresh) return SolveTermination::kStalled;
     start = estimate_;
   }
 }

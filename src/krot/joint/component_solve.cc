@@ -13,32 +13,18 @@
 namespace krot::internal {
 namespace {
 
-// A working set takes in the points with residuals above this share of its
-// cost, the worst first, and its points grow by at most this factor.
-constexpr double kShareOfLevel = 0.9;
-constexpr double kMaxGrowth = 3;
 // The share of the gap asked for that a working set's own proof may leave. The
 // rest is how far other points may exceed the set's cost.
 constexpr double kShareOfGapForProof = 0.5;
-// After this many working sets, everything is taken in.
-constexpr int kMaxRounds = 12;
-// A component with fewer points per frame is solved as a whole: ties alone
-// would take in most of it.
-constexpr int kFewPointsPerFrame = 10;
-// Baselines below this, relative to the median depth, hardly set the scale.
-constexpr double kSizeThatSetsScale = 1e-3;
 
 // Whether known multipliers may be used as a start. Where only tiny baselines
 // set the scale, stationarity in the scale is reached last, and from a start
 // off the central path perhaps never.
 bool CanStartWarm(const KnownRotationProblem& problem,
                   const Estimate& estimate) {
-  if (IsScaleFree(problem)) return true;
-  double size = FixedExtent(problem);
-  for (const View& view : problem.views) {
-    size = std::max(size, view.cam_from_rig_translation.norm());
-  }
-  return size >= kSizeThatSetsScale * MedianDepth(problem, estimate);
+  return IsScaleFree(problem) ||
+         std::max(FixedExtent(problem), LongestBaseline(problem)) >=
+             kTinyBaseline * MedianDepth(problem, estimate);
 }
 
 // Broadcasts the first rank's certificate of a gathered part to every rank,
@@ -86,7 +72,7 @@ std::vector<int64_t> ComponentSolve::Place::InWhole(
 
 // Solves one connected part of the working set. If other points exceed its
 // cost, the solve ends without a proof: the set needs more points first.
-JointTermination ComponentSolve::SolvePart(const Place& place,
+SolveTermination ComponentSolve::SolvePart(const Place& place,
                                            const ProblemSubset& part,
                                            const IterationReport& report) {
   JointOptions options = options_;
@@ -100,16 +86,16 @@ JointTermination ComponentSolve::SolvePart(const Place& place,
                            : std::vector<Multiplier>(),
                        known_.optimum());
   // A part whose cost is below the bound of another one is good enough.
-  if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
+  if (solve.cost() <= lower_bound_) return SolveTermination::kGapReached;
   if (iterations_ >= options_.max_iterations) {
-    return JointTermination::kMaxIterations;
+    return SolveTermination::kMaxIterations;
   }
   const auto replace = [&](Estimate optimum) {
     RestoreGaugeIfHarmless(part.problem(), start, options_.norm, here,
                            &optimum);
     part.Replace(optimum, place.candidate);
   };
-  const JointTermination termination = solve.Run(
+  const SolveTermination termination = solve.Run(
       options_.max_iterations - iterations_,
       [&](const Estimate& estimate) {
         replace(estimate);
@@ -132,22 +118,22 @@ JointTermination ComponentSolve::SolvePart(const Place& place,
   return termination;
 }
 
-JointTermination ComponentSolve::SolveParts(const Place& place,
+SolveTermination ComponentSolve::SolveParts(const Place& place,
                                             std::vector<int64_t> observations,
                                             const IterationReport& report) {
-  JointTermination worst = JointTermination::kGapReached;
+  SolveTermination worst = SolveTermination::kGapReached;
   for (std::vector<int64_t>& part :
        SplitIntoComponents(place.problem, std::move(observations))) {
-    const JointTermination termination =
+    const SolveTermination termination =
         SolvePart(place, ProblemSubset(place.problem, std::move(part)), report);
-    if (termination == JointTermination::kGapReached) continue;
+    if (termination == SolveTermination::kGapReached) continue;
     worst = termination;
-    if (termination != JointTermination::kStalled || !do_others_fit_) break;
+    if (termination != SolveTermination::kStalled || !do_others_fit_) break;
   }
   return worst;
 }
 
-JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
+SolveTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
                                                  Estimate* candidate) {
   std::vector<int64_t> observations = set_.Observations();
   num_working_observations_ =
@@ -161,7 +147,7 @@ JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
 
 // SolveWorkingSet where ranks share the points. The first rank solves the set;
 // whenever it calls fit_others, all ranks take part in FitOthers.
-JointTermination ComponentSolve::SolveGathered(const IterationReport& report,
+SolveTermination ComponentSolve::SolveGathered(const IterationReport& report,
                                                Estimate* candidate) {
   Ranks& ranks = *context_.ranks;
   const GatheredPart gathered(problem_, set_.Observations(), &ranks);
@@ -180,7 +166,7 @@ JointTermination ComponentSolve::SolveGathered(const IterationReport& report,
   };
   std::optional<Certificate> earlier =
       std::exchange(certificate_, std::nullopt);
-  JointTermination termination = JointTermination::kNotRun;
+  SolveTermination termination = SolveTermination::kNotRun;
   if (ranks.IsFirst()) {
     std::vector<int64_t> all(gathered.in_whole().size());
     std::iota(all.begin(), all.end(), 0);
@@ -223,9 +209,9 @@ void ComponentSolve::Keep(const Estimate& candidate) {
 
 // Solves the working set, or reads its result from the checkpoint: it is a step
 // of its own.
-JointTermination ComponentSolve::SolveOrTake(const IterationReport& report,
+SolveTermination ComponentSolve::SolveOrTake(const IterationReport& report,
                                              Estimate* candidate) {
-  JointTermination termination = JointTermination::kNotRun;
+  SolveTermination termination = SolveTermination::kNotRun;
   std::vector<JointIteration> iterations;
   size_t num_reported = 0;
   RunStep(
@@ -260,27 +246,27 @@ JointTermination ComponentSolve::SolveOrTake(const IterationReport& report,
   return termination;
 }
 
-JointTermination ComponentSolve::Run(const IterationReport& report) {
-  if (IsLowEnough()) return JointTermination::kGapReached;
+// A set takes in the points with residuals above 0.9 of its cost, the worst
+// first, up to thrice its points; after twelve sets all of them.
+SolveTermination ComponentSolve::Run(const IterationReport& report) {
+  if (options_.IsLowEnough(cost_)) return SolveTermination::kGapReached;
+  // With so few points per frame, ties alone would take in most of them.
   if (SumOfRanks(context_, problem_.num_points) <
-      int64_t{kFewPointsPerFrame} * problem_.num_frames) {
+      int64_t{10} * problem_.num_frames) {
     set_.AddAll();
   }
   for (int round = 1;; ++round) {
     Estimate candidate = estimate_;
-    const JointTermination termination = SolveOrTake(report, &candidate);
-    if (IsGapReached()) return JointTermination::kGapReached;
-    if (set_.IsAll() || termination == JointTermination::kInterrupted ||
-        termination == JointTermination::kMaxIterations) {
+    const SolveTermination termination = SolveOrTake(report, &candidate);
+    if (IsGapReached()) return SolveTermination::kGapReached;
+    if (set_.IsAll() || termination == SolveTermination::kInterrupted ||
+        termination == SolveTermination::kMaxIterations) {
       return termination;
     }
     const int64_t num_added = set_.AddAbove(
-        candidate, options_.norm, kShareOfLevel * level_,
-        static_cast<int64_t>((kMaxGrowth - 1) *
-                             static_cast<double>(set_.num_points())) +
-            1,
+        candidate, options_.norm, 0.9 * level_, 2 * set_.num_points() + 1,
         ShareOfLevel(problem_, candidate, context_));
-    if (do_others_fit_ || num_added == 0 || round == kMaxRounds) set_.AddAll();
+    if (do_others_fit_ || num_added == 0 || round == 12) set_.AddAll();
   }
 }
 

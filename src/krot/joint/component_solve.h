@@ -49,7 +49,7 @@ class CertifiedSolve {
   // Takes at most `max_iterations`, but does not interrupt a search for a fresh
   // start. Calls `take` now and then, and before every certificate that it
   // tries; ends as kStalled if that returns false.
-  JointTermination Run(int max_iterations, const TakeEstimate& take,
+  SolveTermination Run(int max_iterations, const TakeEstimate& take,
                        const IterationReport& report);
 
   // The best so far, never worse than the start, and its cost in pixels.
@@ -67,13 +67,9 @@ class CertifiedSolve {
 
  private:
   bool IsGapReached() const {
-    return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
-           IsLowEnough();
+    return options_.IsGapReached(cost_, lower_bound_);
   }
   double WarmMargin() const;
-  bool IsLowEnough() const {
-    return cost_ <= options_.sufficient_cost || IsZeroUpToRounding(cost_);
-  }
   InteriorPointTermination RunFrom(Estimate start, double start_margin,
                                    const TakeEstimate& take,
                                    const IterationReport& report);
@@ -117,7 +113,7 @@ class ComponentSolve {
                  const Estimate& start, KnownMultipliers* known);
 
   // `report` is called after every iteration, with all but the time filled in.
-  JointTermination Run(const IterationReport& report);
+  SolveTermination Run(const IterationReport& report);
 
   const Estimate& estimate() const { return estimate_; }
   double cost() const { return std::min(cost_, reached_); }
@@ -131,11 +127,7 @@ class ComponentSolve {
                                      context_.num_threads));
   }
   bool IsGapReached() const {
-    return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
-           IsLowEnough();
-  }
-  bool IsLowEnough() const {
-    return cost_ <= options_.sufficient_cost || IsZeroUpToRounding(cost_);
+    return options_.IsGapReached(cost_, lower_bound_);
   }
   // The problem from which a working set is taken: the component itself or,
   // where ranks share the points, the set gathered on the first rank.
@@ -150,16 +142,16 @@ class ComponentSolve {
     std::vector<int64_t> InWhole(const ProblemSubset& part) const;
   };
 
-  JointTermination SolveOrTake(const IterationReport& report,
+  SolveTermination SolveOrTake(const IterationReport& report,
                                Estimate* candidate);
-  JointTermination SolveWorkingSet(const IterationReport& report,
+  SolveTermination SolveWorkingSet(const IterationReport& report,
                                    Estimate* candidate);
-  JointTermination SolveGathered(const IterationReport& report,
+  SolveTermination SolveGathered(const IterationReport& report,
                                  Estimate* candidate);
-  JointTermination SolveParts(const Place& place,
+  SolveTermination SolveParts(const Place& place,
                               std::vector<int64_t> observations,
                               const IterationReport& report);
-  JointTermination SolvePart(const Place& place, const ProblemSubset& part,
+  SolveTermination SolvePart(const Place& place, const ProblemSubset& part,
                              const IterationReport& report);
   bool FitOthers(Estimate* candidate);
   void Keep(const Estimate& candidate);

@@ -9,8 +9,10 @@
 #include "krot/base/context.h"
 #include "krot/conic/interior_point.h"
 #include "krot/math/norm.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
+#include "krot/solve.h"
 #include "krot/verify/certificate_check.h"
 
 namespace krot::internal {
@@ -88,25 +90,28 @@ struct JointOptions {
   double sufficient_cost = 0;        // stops once it is reached, pixels; >= 0
   JointCallback callback;            // counts over all components; may be empty
   Checkpoint* checkpoint = nullptr;  // of working sets; may be null
-};
 
-enum class JointTermination {
-  kNotRun,
-  // Certified, or a cost that is zero up to rounding, or sufficient.
-  kGapReached,
-  kMaxIterations,
-  kStalled,  // rounding ended the progress before the gap was reached
-  kInterrupted,
+  // Whether a cost, pixels, is low enough without a proof, and whether it is
+  // with one of `lower_bound`.
+  bool IsLowEnough(double cost_px) const {
+    return cost_px <= sufficient_cost || IsZeroUpToRounding(cost_px);
+  }
+  bool IsGapReached(double cost_px, double lower_bound) const {
+    return cost_px - lower_bound <= relative_gap * cost_px ||
+           IsLowEnough(cost_px);
+  }
 };
 
 struct JointSummary {
-  JointTermination termination = JointTermination::kNotRun;
+  // kGapReached: certified, or a cost that is zero up to rounding, or
+  // sufficient. kStalled: rounding ended the progress before. Otherwise
+  // kMaxIterations or kInterrupted.
+  SolveTermination termination = SolveTermination::kNotRun;
   double cost_initial = 0;  // pixels
   double cost_final = 0;    // <= cost_initial
   // The highest certified bound of any component: also one of the whole.
   std::optional<Certificate> certificate;
   double lower_bound = 0;  // pixels, what the certificate proves; 0 if none
-  int32_t num_components = 0;
   // The size of the last working sets, over all components.
   int64_t num_working_observations = 0;
   std::vector<JointIteration> iterations;
@@ -129,7 +134,6 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
 
 struct FeasibleStartOptions {
   Norm norm;
-  int max_iterations = 200;  // >= 1
   // A depth that is small against the scene, scene units. It affects the path
   // of the iterations, not what is feasible. None: a share of the longest
   // baseline or distance of fixed positions, or 1 where the scale is free.
@@ -156,9 +160,8 @@ InteriorPointTermination FindEstimateBelow(
     Estimate* estimate, std::vector<Multiplier>* multipliers);
 
 // Replaces an estimate by one at a quarter of its cost (FindEstimateBelow), as
-// often as one is found. Returns whether any was found. Each takes about five
-// iterations.
-bool LowerByFeasibility(const KnownRotationProblem& problem,
+// often as one is found. Each takes about five iterations.
+void LowerByFeasibility(const KnownRotationProblem& problem,
                         const FeasibleStartOptions& options,
                         const Context& context, Estimate* estimate);
 
@@ -166,23 +169,16 @@ bool LowerByFeasibility(const KnownRotationProblem& problem,
 // bisection iteration at a loose upper bound" [Zhang18, Sec. 4.2].
 
 struct InitializerOptions {
-  Norm norm;                 // p = 1, 2 or infinity
-  double max_error = 100;    // the bound that the start must meet, pixels; > 0
-  int max_iterations = 200;  // per component; >= 1
-  JointCallback callback;    // counts over all components; may be empty
-};
-
-enum class InitializerTermination {
-  kNotRun,
-  kFeasible,    // every depth is positive, every residual below max_error
-  kInfeasible,  // proved: no estimate does that
-  kFailed,      // neither was shown: no estimate was found at any bound
-  kInterrupted,
+  Norm norm;               // p = 1, 2 or infinity
+  double max_error = 100;  // the bound that the start must meet, pixels; > 0
+  JointCallback callback;  // counts over all components; may be empty
 };
 
 struct InitializerSummary {
-  InitializerTermination termination = InitializerTermination::kNotRun;
-  double cost = 0;  // pixels, of the estimate if feasible
+  // kWithinBound: every depth is positive, every residual below max_error;
+  // kInfeasible: proved, no estimate does that; kNoStart: neither was shown, no
+  // estimate was found at any bound; kInterrupted.
+  SolveTermination termination = SolveTermination::kNotRun;
   std::vector<JointIteration> iterations;
   // kInfeasible: proves lower_bound > max_error.
   std::optional<Certificate> certificate;

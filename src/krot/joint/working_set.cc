@@ -14,19 +14,6 @@
 namespace krot::internal {
 namespace {
 
-// The first working set has the points with a residual above this share of the
-// cost.
-constexpr double kShareOfCost = 0.9;
-constexpr int kTiesPerFrame = 20;
-// The usual ShareOfLevel.
-constexpr double kNearShare = 0.7;
-// Baselines below this, relative to the median depth, are tiny.
-constexpr double kTinyBaseline = 1e-3;
-// AddAbove takes at least this many observations of a point. With fewer, the
-// point's other observations soon exceed the level.
-constexpr size_t kLeastPerPoint = 4;
-constexpr int64_t kPointsPerChunk = 1024;
-
 // A residual with changed sign, so that sorting puts the worst first, and the
 // index of its point or observation.
 using Candidate = std::pair<double, int64_t>;
@@ -55,6 +42,132 @@ void KeepWorst(int64_t count, std::vector<Candidate>* candidates) {
                    candidates->end());
   candidates->resize(count);
 }
+
+int64_t LengthOf(const KnownRotationProblem& problem, int32_t point) {
+  return problem.point_begin[point + 1] - problem.point_begin[point];
+}
+
+// One rank's next tracks in the order of Ties. offer[0] is 1 if the rank has no
+// more tracks after these, otherwise 0; then follow, for each track, its length
+// and its frames.
+using Offer = std::vector<int32_t>;
+
+// Reads the tracks of an offer one after the other.
+struct Reader {
+  const Offer& offer;
+  size_t next = 1;
+
+  bool HasMore() const { return next < offer.size(); }
+  bool IsAll() const { return offer[0] != 0; }
+  int32_t Length() const { return offer[next]; }
+  Range<const int32_t*> Frames() const {
+    return {&offer[next] + 1, &offer[next] + 1 + Length()};
+  }
+  void Advance() { next += 1 + static_cast<size_t>(Length()); }
+};
+
+// Chooses points of `others`, which ascend, that tie frames to the working set.
+// Goes through them by falling length of their tracks and takes every point
+// that is seen by a frame with fewer than `count` observations so far: those of
+// `tied`, per frame, and those of the points taken before. Where ranks share
+// the points, each gets its share of the points that one process would take.
+class Ties {
+ public:
+  Ties(const KnownRotationProblem& problem, std::vector<int32_t> others,
+       int count, std::vector<int64_t> tied)
+      : problem_(problem),
+        others_(std::move(others)),
+        count_(count),
+        tied_(std::move(tied)) {
+    std::stable_sort(others_.begin(), others_.end(), [&](int32_t a, int32_t b) {
+      return LengthOf(problem, a) > LengthOf(problem, b);
+    });
+  }
+
+  // All ranks must call it, with the same `tied`.
+  std::vector<int32_t> Find(const Context& context) {
+    for (;;) {
+      const Offer own = MakeOffer();
+      const bool is_any_left =
+          context.ranks == nullptr
+              ? Decide({own}, 0)
+              : Decide(context.ranks->ExchangeValues(
+                           std::vector<Offer>(context.ranks->count(), own)),
+                       context.ranks->rank());
+      if (!is_any_left) return std::move(taken_);
+    }
+  }
+
+ private:
+  bool IsMissing(int32_t frame) const { return tied_[frame] < count_; }
+
+  // Offers only tracks with a frame that still needs ties. The others are
+  // dropped for good, as the number of ties never falls.
+  Offer MakeOffer() {
+    Offer offer = {0};
+    const auto add = [&](int32_t k) {
+      const size_t begin = offer.size();
+      offer.push_back(static_cast<int32_t>(LengthOf(problem_, k)));
+      bool is_missing = false;
+      for (const int64_t i : problem_.OfPoint(k)) {
+        offer.push_back(problem_.FrameOf(i));
+        is_missing |= IsMissing(offer.back());
+      }
+      if (!is_missing) offer.resize(begin);
+      return is_missing;
+    };
+    offered_.erase(std::remove_if(offered_.begin(), offered_.end(),
+                                  [&](int32_t k) { return !add(k); }),
+                   offered_.end());
+    while (next_ < others_.size() && offered_.size() < 2048) {
+      const int32_t k = others_[next_++];
+      if (add(k)) offered_.push_back(k);
+    }
+    offer[0] = next_ == others_.size() ? 1 : 0;
+    return offer;
+  }
+
+  // Takes or rejects the tracks of all ranks' offers, as long as it is known
+  // which track comes next: the longest of all offers, and of equal lengths
+  // that of the lower rank. Once the offer of a rank that has more tracks is
+  // used up, it is unknown. Returns whether any are left.
+  bool Decide(const std::vector<Offer>& offers, int rank) {
+    std::vector<Reader> readers;
+    for (const Offer& offer : offers) readers.push_back({offer});
+    size_t num_decided = 0;  // of those offered here
+    for (;;) {
+      Reader* longest = nullptr;
+      for (Reader& reader : readers) {
+        if (!reader.HasMore() && reader.IsAll()) continue;
+        if (!reader.HasMore()) {
+          offered_.erase(offered_.begin(), offered_.begin() + num_decided);
+          return true;
+        }
+        if (longest == nullptr || reader.Length() > longest->Length()) {
+          longest = &reader;
+        }
+      }
+      if (longest == nullptr) return false;
+      const Range<const int32_t*> frames = longest->Frames();
+      const bool is_here = longest == &readers[rank];
+      if (std::any_of(frames.begin(), frames.end(),
+                      [&](int32_t f) { return IsMissing(f); })) {
+        for (const int32_t f : frames) ++tied_[f];
+        if (is_here) taken_.push_back(offered_[num_decided]);
+      }
+      if (is_here) ++num_decided;
+      longest->Advance();
+    }
+  }
+
+  const KnownRotationProblem& problem_;
+  std::vector<int32_t> others_;
+  const int count_;
+  std::vector<int64_t> tied_;     // per frame
+  std::vector<int32_t> offered_;  // undecided points of this rank
+  size_t next_ = 0;               // of others_
+  std::vector<int32_t> taken_;
+};
 
 }  // namespace
 
@@ -91,8 +204,7 @@ double WorkingSet::LargestOutside(const std::vector<AffineMap>& cameras,
                                   const Estimate& estimate, Norm norm,
                                   int32_t k) const {
   double largest = 0;
-  for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-       ++i) {
+  for (const int64_t i : problem_.OfPoint(k)) {
     if (takes_[i] != 0) continue;
     const Observation& o = problem_.observations[i];
     largest = std::max(
@@ -107,13 +219,10 @@ int64_t WorkingSet::AddAbove(const Estimate& estimate, Norm norm, double level,
   const std::vector<AffineMap> cameras =
       CamerasFromWorld(problem_, estimate.translations);
   std::vector<double> outside(problem_.num_points);
-  ParallelFor(problem_.num_points, kPointsPerChunk, context_.num_threads,
-              [&](int64_t begin, int64_t end, int) {
-                for (int64_t k = begin; k < end; ++k) {
-                  outside[k] = LargestOutside(cameras, estimate, norm,
-                                              static_cast<int32_t>(k));
-                }
-              });
+  ParallelForEach(problem_.num_points, context_.num_threads, [&](int64_t k) {
+    outside[k] =
+        LargestOutside(cameras, estimate, norm, static_cast<int32_t>(k));
+  });
   std::vector<Candidate> above;
   for (int32_t k = 0; k < problem_.num_points; ++k) {
     if (outside[k] > level) above.emplace_back(-outside[k], first_point_ + k);
@@ -128,8 +237,7 @@ int64_t WorkingSet::AddAbove(const Estimate& estimate, Norm norm, double level,
     const int64_t k = worst.second - first_point_;
     if (k < 0 || k >= problem_.num_points) continue;
     residuals.clear();
-    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-         ++i) {
+    for (const int64_t i : problem_.OfPoint(k)) {
       const Observation& o = problem_.observations[i];
       residuals.emplace_back(
           -ResidualOf(ViewPoint(cameras[o.view], o, estimate.points[k]), norm),
@@ -137,7 +245,8 @@ int64_t WorkingSet::AddAbove(const Estimate& estimate, Norm norm, double level,
     }
     std::sort(residuals.begin(), residuals.end());
     for (size_t n = 0; n < residuals.size(); ++n) {
-      if (n >= kLeastPerPoint && -residuals[n].first < share * level) break;
+      // With fewer than four, the point's others would soon exceed the level.
+      if (n >= 4 && -residuals[n].first < share * level) break;
       Take(residuals[n].second);
     }
   }
@@ -148,7 +257,7 @@ int64_t WorkingSet::AddAbove(const Estimate& estimate, Norm norm, double level,
 void WorkingSet::AddTies(int count) {
   std::vector<int64_t> tied(problem_.num_frames, 0);
   for (const int64_t i : Observations()) {
-    ++tied[problem_.views[problem_.observations[i].view].frame];
+    ++tied[problem_.FrameOf(i)];
   }
   ReduceRanks(context_, std::plus<int64_t>(), &tied);
   std::vector<int32_t> others;
@@ -157,15 +266,13 @@ void WorkingSet::AddTies(int count) {
     const auto end = takes_.begin() + problem_.point_begin[k + 1];
     if (std::find(begin, end, 0) != end) others.push_back(k);
   }
-  const std::vector<int32_t> ties =
-      FindTies(problem_, std::move(others), count, std::move(tied), context_);
-  for (const int32_t k : ties) TakePoint(k);
+  Ties ties(problem_, std::move(others), count, std::move(tied));
+  for (const int32_t k : ties.Find(context_)) TakePoint(k);
   CountTaken();
 }
 
 void WorkingSet::TakePoint(int32_t point) {
-  for (int64_t i = problem_.point_begin[point];
-       i < problem_.point_begin[point + 1]; ++i) {
+  for (const int64_t i : problem_.OfPoint(point)) {
     Take(i);
   }
 }
@@ -203,51 +310,41 @@ double WorkingSet::Cost(const Estimate& estimate, Norm norm) const {
   return MaxOfRanks(context_, cost);
 }
 
-double ShareOfLevel(const KnownRotationProblem& problem,
-                    const Estimate& estimate, const Context& context) {
-  if (!HasBaseline(problem)) return kNearShare;
+double LongestBaseline(const KnownRotationProblem& problem) {
   double longest = 0;
   for (const View& view : problem.views) {
     longest = std::max(longest, view.cam_from_rig_translation.norm());
   }
+  return longest;
+}
+
+double ShareOfLevel(const KnownRotationProblem& problem,
+                    const Estimate& estimate, const Context& context) {
   const bool is_tiny =
-      longest < kTinyBaseline * CoarseMedianDepth(problem, estimate, context);
-  return is_tiny ? 0 : kNearShare;
+      HasBaseline(problem) &&
+      LongestBaseline(problem) <
+          kTinyBaseline * CoarseMedianDepth(problem, estimate, context);
+  return is_tiny ? 0 : 0.7;
 }
 
 WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
                            const Estimate& estimate, Norm norm, double cost,
                            const Context& context) {
   WorkingSet set(problem, context);
-  set.AddAbove(estimate, norm, kShareOfCost * cost,
-               std::numeric_limits<int64_t>::max(),
+  set.AddAbove(estimate, norm, 0.9 * cost, std::numeric_limits<int64_t>::max(),
                ShareOfLevel(problem, estimate, context));
-  set.AddTies(kTiesPerFrame);
+  set.AddTies(20);
   return set;
 }
-
-namespace {
-
-// PlacePoints stops moving a point below this share of the level. It is less
-// than the share above which a working set takes points in
-// (component_solve.cc).
-constexpr double kSufficientShareOfLevel = 0.7;
-// The sweeps of ExtendSolution solve blocks above kShareOfHighest of the
-// highest cost allowed, to kSweepTolerance, relative. They end if a sweep
-// leaves more than kExcessLeft of the excess over the highest cost.
-constexpr double kShareOfHighest = 0.9;
-constexpr double kSweepTolerance = 1e-3;
-constexpr double kExcessLeft = 0.8;
-constexpr int kMaxSweeps = 10;
-
-}  // namespace
 
 bool PlacePoints(const KnownRotationProblem& problem, Norm norm,
                  const Context& context, double level, Estimate* estimate) {
   BlockSweep blocks(problem, FastDescentOptions(), norm, context);
   DescentGoal goal;
   goal.level = level;
-  goal.sufficient = kSufficientShareOfLevel * level;
+  // Less than the share above which a working set takes points in
+  // (component_solve.cc).
+  goal.sufficient = 0.7 * level;
   blocks.SetGoal(goal);
   return std::isfinite(blocks.IntersectPoints(estimate));
 }
@@ -263,14 +360,16 @@ bool ExtendSolution(const KnownRotationProblem& problem, Norm norm,
   };
   double left = excess();
   if (left <= 0) return true;
+  // Blocks well below the highest cost allowed stay. Sweeps end where one takes
+  // less than a fifth off the excess.
   BlockSweep blocks(problem, FastDescentOptions(), norm, context);
-  blocks.SetGoal({kSweepTolerance, kShareOfHighest * highest});
-  for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
+  blocks.SetGoal({/*tolerance=*/1e-3, /*level=*/0.9 * highest});
+  for (int sweep = 0; sweep < 10; ++sweep) {
     blocks.ResectFrames(estimate);
     blocks.IntersectPoints(estimate);
     const double before = std::exchange(left, excess());
     if (left <= 0) return true;
-    if (left > kExcessLeft * before) return false;
+    if (left > 0.8 * before) return false;
   }
   return false;
 }

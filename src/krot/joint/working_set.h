@@ -10,17 +10,6 @@
 
 namespace krot::internal {
 
-// Chooses points of `others`, which ascend, that tie frames to the working set.
-// Goes through them by falling length of their tracks and takes every point
-// that is seen by a frame with fewer than `count` observations so far: those of
-// `tied`, per frame, and those of the points taken before. Where ranks share
-// the points, all must call it, with the same `tied`; each gets its share of
-// the points that one process would take. O(observations).
-std::vector<int32_t> FindTies(const KnownRotationProblem& problem,
-                              std::vector<int32_t> others, int count,
-                              std::vector<int64_t> tied,
-                              const Context& context);
-
 // The observations of a problem that the joint solver looks at: those with
 // residuals near the maximum, and enough others to tie every frame. The optimum
 // of a working set is a lower bound on that of the whole. Both are equal if all
@@ -81,6 +70,11 @@ class WorkingSet {
   int64_t num_observations_of_whole_;
   int64_t first_point_ = 0;
 };
+
+// The longest of the rigs' baselines, scene units; 0 if there are none.
+double LongestBaseline(const KnownRotationProblem& problem);
+// Baselines below this, relative to the median depth, hardly set the scale.
+inline constexpr double kTinyBaseline = 1e-3;
 
 // The `share` with which the joint solver calls AddAbove. It is 0 where the
 // baselines that set the scale are tiny beside the depths: a few observations

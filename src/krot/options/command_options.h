@@ -4,7 +4,6 @@
 #include <string>
 
 #include "krot/options/option_table.h"
-#include "krot/outliers/filter_steps.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/pipeline/solve_model.h"

@@ -8,7 +8,7 @@
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
 #include "krot/joint/joint.h"
-#include "krot/pipeline/pixel_proof.h"
+#include "krot/pipeline/stages.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"
@@ -16,22 +16,11 @@
 namespace krot::internal {
 namespace {
 
-// Relative gaps of the solves, round by round, until something is decided. An
-// optimum nearer to the bound than the last gap stays undecided.
-constexpr double kDecisionGaps[] = {1e-2, 1e-3, 1e-5, 1e-6};
-// A start from nothing must have errors below this many times the bound.
-constexpr double kRoughStart = 1000;
 // Joint iterations of one decision. Most take three, and where they are hardest
 // (an endoscope's lens, wrong rotations) one of a thousand takes 200.
 constexpr int kMaxIterations = 400;
 // Relative margin for the difference between the rows' errors and true ones.
 constexpr double kRoomForLenses = 1e-6;
-// Relative gap of the solve whose multipliers are to prove a refutation.
-constexpr double kProofGap = 1e-6;
-constexpr double kJustAbove = 1e-9;
-// If the rows' bound exceeds the error bound by less than this share, there is
-// no room for the regions of lenses, and ProveInPixels is not tried.
-constexpr double kWorthWidening = 1e-2;
 
 void Add(const KnownRotationProblem& problem,
          const std::vector<JointIteration>& iterations, Work* work) {
@@ -46,11 +35,11 @@ bool HaveStart(const KnownRotationProblem& problem, const ErrorBound& bound,
   if (AllDepthsPositive(problem, *start, context.num_threads)) return true;
   InitializerOptions options;
   options.norm = bound.norm;
-  options.max_error = kRoughStart * bound.max_error;
+  options.max_error = 1000 * bound.max_error;
   const InitializerSummary summary =
       FindStart(problem, options, context, start);
   Add(problem, summary.iterations, work);
-  return summary.termination == InitializerTermination::kFeasible;
+  return summary.termination == SolveTermination::kWithinBound;
 }
 
 }  // namespace
@@ -68,7 +57,8 @@ Decision Decide(const Model& model, const BuiltProblem& given,
   if (!HaveStart(part.problem, bound, context, &decision.estimate, work)) {
     return decision;
   }
-  for (const double gap : kDecisionGaps) {
+  // An optimum nearer to the bound than the last gap stays undecided.
+  for (const double gap : {1e-2, 1e-3, 1e-5, 1e-6}) {
     options.relative_gap = gap;
     reprojection.TakeRows(decision.estimate, context.num_threads,
                           &part.problem);
@@ -114,7 +104,7 @@ std::optional<PixelCertificate> ProveRefutation(
   // room for lens distortion.
   JointOptions options;
   options.norm = bound.norm;
-  options.relative_gap = kProofGap;
+  options.relative_gap = 1e-6;
   options.max_iterations = kMaxIterations;
   Estimate estimate = refuted.estimate;
   const JointSummary summary =
@@ -124,9 +114,10 @@ std::optional<PixelCertificate> ProveRefutation(
   PixelCertificate proof;
   proof.rows = *summary.certificate;
   proof.bearings = BearingsOfPoints(model, part, refuted.estimate, proof.rows);
-  proof.lower_bound = (1 + kJustAbove) * bound.max_error;
+  proof.lower_bound = (1 + 1e-9) * bound.max_error;
   if (is_accepted(proof)) return proof;
-  if (summary.lower_bound < (1 + kWorthWidening) * bound.max_error) {
+  // Below this there is no room for the regions of lenses.
+  if (summary.lower_bound < (1 + 1e-2) * bound.max_error) {
     return std::nullopt;
   }
   std::optional<PixelCertificate> best =
@@ -152,9 +143,6 @@ std::vector<std::vector<int64_t>> Parts(
                              PruneUnconstrained(built.problem, observations));
 }
 
-// Larger supports are not reduced, as deletion takes a solve per observation.
-constexpr size_t kMaxDeletions = 60;
-
 // Makes a refuted support irreducible, within its own small problem.
 class Deletion {
  public:
@@ -172,7 +160,7 @@ class Deletion {
   // False if the support is too large, or if an observation is kept only
   // because nothing was decided.
   bool Run() {
-    if (kept_.size() > kMaxDeletions) return false;
+    if (kept_.size() > 60) return false;  // a solve per observation
     bool is_irreducible = true;
     std::vector<int64_t> untried = kept_;
     while (!untried.empty() && !context_.IsCancelled()) {

@@ -19,10 +19,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-// COLMAP's mapper uses no pair with fewer (Mapper.min_num_matches).
-constexpr int64_t kMinMatchesOfPair = 15;
-// Cells of a search for a baseline; its optimality is not needed.
-constexpr int64_t kCellsOfPair = 1000;
+void EraseShort(std::vector<MatchTrack>* tracks) {
+  tracks->erase(std::remove_if(tracks->begin(), tracks->end(),
+                               [](const MatchTrack& track) {
+                                 return track.keypoints.size() < 2;
+                               }),
+                tracks->end());
+}
 
 class MatchTriangulator {
  public:
@@ -41,11 +44,7 @@ class MatchTriangulator {
     AddMatches();
     std::vector<MatchTrack> tracks = Components();
     for (MatchTrack& track : tracks) numbers_.LeaveOutTwins(&track);
-    tracks.erase(std::remove_if(tracks.begin(), tracks.end(),
-                                [](const MatchTrack& track) {
-                                  return track.keypoints.size() < 2;
-                                }),
-                 tracks.end());
+    EraseShort(&tracks);
     return ModelWith(tracks);
   }
 
@@ -80,9 +79,7 @@ class MatchTriangulator {
     rays_.resize(numbers_.size());
     ParallelFor(static_cast<int64_t>(model_.images.size()), 1,
                 context_.num_threads,
-                [&](int64_t begin, int64_t end, int /*worker*/) {
-                  for (int64_t i = begin; i < end; ++i) TakeRays(i);
-                });
+                [&](int64_t i, int64_t, int) { TakeRays(i); });
   }
 
   void TakeRays(int64_t i) {
@@ -122,17 +119,15 @@ class MatchTriangulator {
     const auto num_pairs = static_cast<int64_t>(database_.pairs.size());
     std::vector<std::vector<std::pair<int64_t, int64_t>>> agreeing(num_pairs);
     ParallelFor(num_pairs, 1, context_.num_threads,
-                [&](int64_t begin, int64_t end, int /*worker*/) {
-                  for (int64_t p = begin; p < end; ++p) {
-                    agreeing[p] = Agreeing(database_.pairs[p]);
-                  }
+                [&](int64_t p, int64_t, int) {
+                  agreeing[p] = Agreeing(database_.pairs[p]);
                 });
     for (int64_t p = 0; p < num_pairs; ++p) {
       const VerifiedPair& pair = database_.pairs[p];
       const auto num_matches = static_cast<int64_t>(pair.matches.size());
       const auto num_agreeing = static_cast<int64_t>(agreeing[p].size());
-      if (num_matches < kMinMatchesOfPair ||
-          !geometries_[pair.image1].has_pose ||
+      // COLMAP's mapper uses no pair with fewer (Mapper.min_num_matches).
+      if (num_matches < 15 || !geometries_[pair.image1].has_pose ||
           !geometries_[pair.image2].has_pose) {
         continue;
       }
@@ -167,7 +162,7 @@ class MatchTriangulator {
         has_positions_
             ? Vector3d(Center(geometries_[pair.image2].cam_from_world) -
                        Center(geometries_[pair.image1].cam_from_world))
-            : SearchBaseline(matches, tolerance, kCellsOfPair).baseline;
+            : SearchBaseline(matches, tolerance, /*max_cells=*/1000).baseline;
     for (size_t n = 0; n < matches.size(); ++n) {
       if (matches[n].ErrorPx(baseline) <= tolerance) {
         agreeing.push_back(keypoints[n]);
@@ -310,11 +305,7 @@ class MatchTriangulator {
 
   void Finish() {
     LeastSquares(&accepted_);
-    accepted_.erase(std::remove_if(accepted_.begin(), accepted_.end(),
-                                   [](const MatchTrack& track) {
-                                     return track.keypoints.size() < 2;
-                                   }),
-                    accepted_.end());
+    EraseShort(&accepted_);
     std::sort(accepted_.begin(), accepted_.end(),
               [](const MatchTrack& a, const MatchTrack& b) {
                 return a.keypoints < b.keypoints;

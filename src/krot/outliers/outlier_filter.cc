@@ -8,7 +8,6 @@
 #include "krot/base/context.h"
 #include "krot/model/derived_models.h"
 #include "krot/outliers/conflict.h"
-#include "krot/outliers/filter_steps.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/parts.h"
 #include "krot/outliers/removal.h"
@@ -18,10 +17,6 @@
 
 namespace krot::internal {
 namespace {
-
-// Relative: rounding may raise an error by this much when a model is written.
-constexpr double kWithin = 1e-9;
-constexpr int kMaxThresholdSolves = 50;
 
 // The ids of these observations' points; ascending.
 std::vector<uint64_t> PointIds(const Model& model, const BuiltProblem& built,
@@ -34,325 +29,258 @@ std::vector<uint64_t> PointIds(const Model& model, const BuiltProblem& built,
   return {ids.begin(), ids.end()};
 }
 
-class OutlierFilter {
+class OutlierFilter : private Filtering {
  public:
   OutlierFilter(const Model& model, const OutlierFilterOptions& options,
                 const Context& context)
-      : model_(model),
-        options_(options),
-        context_(context),
-        bound_{options.solve.norm, options.max_error.value_or(0)},
-        errors_before_(PixelErrors(model, context.num_threads)),
-        is_removed_(model.track_elements.size(), 0),
-        conflict_of_(model.track_elements.size(), -1) {}
+      : Filtering(model, options, context),
+        bound_{options.solve.norm, options.max_error.value_or(0)} {}
 
-  OutlierFilterResult Run();
+  OutlierFilterResult Run() {
+    if (options_.method == OutlierMethod::kConflicts) {
+      FilterByConflicts();
+    } else {
+      FilterByThreshold();
+    }
+    summary_.max_error = bound_.max_error;
+    if (context_.IsCancelled()) return {model_, std::move(summary_)};
+    if (is_given_back_) {
+      summary_.is_within = true;
+      summary_.pixel_error_after = summary_.pixel_error_before;
+      return {model_, std::move(summary_)};
+    }
+    const std::vector<double> errors = Describe();
+    UpdatePointErrors(errors, &kept_.model);
+    summary_.is_within =
+        std::all_of(errors.begin(), errors.end(),
+                    [this](double error) { return IsWithin(error); });
+    if (options_.solve.polish != Polish::kNone && summary_.solve) {
+      summary_.solve->polish =
+          PolishModel(options_.solve.polish, options_.solve.finish.loss,
+                      options_.solve.problem.fixed, context_, &kept_.model);
+    }
+    return {std::move(kept_.model), std::move(summary_)};
+  }
 
  private:
-  bool IsWithin(double error) const {
-    return error <= (1 + kWithin) * bound_.max_error;
+  bool IsWithin(double error) const {  // rounding counts for nothing
+    return error <= (1 + 1e-9) * bound_.max_error;
   }
-  void FilterByConflicts();
-  void FilterByThreshold();
+
+  void FilterByConflicts() {
+    const RemovalStart start = FindRemovalStart(model_, options_, context_);
+    const BuiltProblem& built = start.built;
+    summary_.init = start.init;
+    if (options_.spares_what_fits &&
+        (start.fits_its_positions || start.nearly_fits)) {
+      is_given_back_ = summary_.is_spared = true;
+      bound_.max_error = start.fits_its_positions ? 0 : start.max_error;
+      return;
+    }
+    bound_.max_error = start.max_error;
+    summary_.is_bound_beyond_reason =
+        !options_.max_error && start.max_error > options_.solve.init_max_error;
+    const std::vector<uint64_t> elements = ElementsOf(model_, built);
+    std::vector<Conflict> found;
+    const std::optional<Removal> removal = RemoveFew(built, &found);
+    if (context_.IsCancelled()) return;
+    if (!removal) {
+      is_given_back_ = true;
+      summary_.conflicts =
+          DescribeConflicts(model_, built, options_.solve.norm,
+                            summary_.noise->limit.max_error, {});
+      return;
+    }
+    for (const int64_t i : removal->observations) is_removed_[elements[i]] = 1;
+    if (options_.find_conflicts) {
+      Pack(built, *removal, std::move(found), elements);
+    }
+    if (options_.on_removed) {
+      options_.on_removed(static_cast<int64_t>(removal->observations.size()));
+    }
+    Model moved;
+    PlaceAt(built, *removal, &moved);
+    Solve(std::move(moved));
+    if (start.init == SolveInit::kFeasible && !context_.IsCancelled()) {
+      FindWeakParts(built);
+    }
+    // Observations that had no part in the problem may still be above the
+    // bound.
+    if (!RemoveAbove()) return;
+    std::vector<char> is_gone;
+    for (const uint64_t e : kept_.element_of) is_gone.push_back(is_removed_[e]);
+    RemoveMore(is_gone);
+  }
+
+  void FilterByThreshold() {
+    for (size_t e = 0; e < errors_before_.size(); ++e) {
+      is_removed_[e] = !IsWithin(errors_before_[e]);
+    }
+    Model moved = model_;
+    do {
+      Solve(moved);
+    } while (!context_.IsCancelled() && summary_.num_solves < 50 &&
+             RemoveAbove());
+  }
+
+  // Chooses what to remove. Conflicts that this finds on the way go to `found`.
+  // Where noise is to choose the bound, it is set here, or none is returned if
+  // noise explains all errors.
   std::optional<Removal> RemoveFew(const BuiltProblem& built,
-                                   std::vector<Conflict>* found);
+                                   std::vector<Conflict>* found) {
+    if (built.pixels.empty()) return Removal{{}, built.start, {}};
+    if (options_.make_profile) return MakeProfile(built, found);
+    if (bound_.max_error == 0) {
+      MeasureNoise(built);
+      if (summary_.noise->ExplainsAll()) return std::nullopt;
+      bound_.max_error = summary_.noise->limit.max_error;
+    }
+    const Timer timer;
+    // A robust start leaves few above the bound already: programmes would take
+    // ten times as long to find a two-hundredth fewer, and do not hold parts'
+    // scales.
+    const bool is_enough =
+        summary_.init == SolveInit::kFeasible && !options_.find_conflicts;
+    Removal removal = FindRemoval(model_, built, bound_, context_,
+                                  is_enough ? 0 : kMaxProgrammes);
+    summary_.seconds_removal = timer.Seconds();
+    return removal;
+  }
+
+  // The removal of the profile's last level or, where no bound was given, of
+  // its elbow.
   std::optional<Removal> MakeProfile(const BuiltProblem& built,
-                                     std::vector<Conflict>* found);
-  void MeasureNoise(const BuiltProblem& built);
-  void Pack(const BuiltProblem& built, const Removal& removal,
-            std::vector<Conflict> found, const std::vector<uint64_t>& elements);
-  void PlaceAt(const BuiltProblem& built, const Removal& removal, Model* moved);
-  void Solve(Model moved);
-  bool RemoveAbove();
-  void FindWeakParts(const BuiltProblem& built);
-
-  const Model& model_;
-  const OutlierFilterOptions& options_;
-  const Context& context_;
-  ErrorBound bound_;
-  const std::vector<double> errors_before_;  // per track element
-  std::vector<char> is_removed_;
-  std::vector<int64_t> conflict_of_;
-  RemovedObservations kept_;    // as of the last solve
-  bool is_given_back_ = false;  // nothing is removed, the model is the input
-  OutlierFilterSummary summary_;
-};
-
-// Moves a copy of the input to the removal's estimate, in the input's frame.
-void OutlierFilter::PlaceAt(const BuiltProblem& built, const Removal& removal,
-                            Model* moved) {
-  std::vector<int64_t> kept;
-  size_t next = 0;
-  for (size_t i = 0; i < built.pixels.size(); ++i) {
-    if (next < removal.observations.size() &&
-        removal.observations[next] == static_cast<int64_t>(i)) {
-      ++next;
-    } else {
-      kept.push_back(static_cast<int64_t>(i));
+                                     std::vector<Conflict>* found) {
+    const Timer timer;
+    ErrorProfile profile = FindErrorProfile(
+        model_, built, {bound_.norm, options_.max_error}, context_);
+    ErrorProfileSummary& summary = summary_.profile.emplace();
+    for (const ProfileLevel& level : profile.levels) {
+      summary.levels.push_back(
+          {static_cast<int64_t>(level.removal.observations.size()),
+           level.max_error, level.lower_bound, level.num_proved,
+           PointIds(model_, built, level.removal.observations)});
     }
-  }
-  Estimate placed = removal.estimate;
-  const ProblemSubset part(built.problem, kept);
-  Estimate own = part.Restrict(placed);
-  RestoreGaugeIfHarmless(part.problem(), part.Restrict(built.start),
-                         options_.solve.norm, context_, &own);
-  part.Replace(own, &placed);
-  *moved = ApplyEstimate(model_, built, placed);
-}
-
-// Chooses what to remove. Conflicts that this finds on the way go to `found`.
-// Where noise is to choose the bound, it is set here, or none is returned if
-// noise explains all errors.
-std::optional<Removal> OutlierFilter::RemoveFew(const BuiltProblem& built,
-                                                std::vector<Conflict>* found) {
-  if (built.pixels.empty()) return Removal{{}, built.start, {}};
-  if (options_.make_profile) return MakeProfile(built, found);
-  if (bound_.max_error == 0) {
-    MeasureNoise(built);
-    if (summary_.noise->ExplainsAll()) return std::nullopt;
-    bound_.max_error = summary_.noise->limit.max_error;
-  }
-  const Timer timer;
-  // A robust start leaves few above the bound already: programmes would take
-  // ten times as long to find a two-hundredth fewer, and do not hold parts'
-  // scales.
-  const bool is_enough =
-      summary_.init == SolveInit::kFeasible && !options_.find_conflicts;
-  Removal removal = FindRemoval(model_, built, bound_, context_,
-                                is_enough ? 0 : kMaxProgrammes);
-  summary_.seconds_removal = timer.Seconds();
-  return removal;
-}
-
-void OutlierFilter::MeasureNoise(const BuiltProblem& built) {
-  NoiseSummary& noise = summary_.noise.emplace();
-  noise.limit = FindNoiseLimit(model_, built, bound_.norm, context_);
-  const OptimumWithout lowest =
-      SolveWithout(model_, built, {}, built.start, bound_.norm,
-                   ErrorProfileOptions().relative_gap,
-                   context_.Within("comparing the errors with noise"));
-  noise.lowest_max_error = lowest.max_error;
-  noise.lower_bound = lowest.lower_bound;
-}
-
-// The removal of the profile's last level or, where no bound was given, of its
-// elbow.
-std::optional<Removal> OutlierFilter::MakeProfile(
-    const BuiltProblem& built, std::vector<Conflict>* found) {
-  const Timer timer;
-  ErrorProfileOptions options;
-  options.norm = bound_.norm;
-  options.max_error = options_.max_error;
-  ErrorProfile profile = FindErrorProfile(model_, built, options, context_);
-  ErrorProfileSummary& summary = summary_.profile.emplace();
-  for (const ProfileLevel& level : profile.levels) {
-    summary.levels.push_back(
-        {static_cast<int64_t>(level.removal.observations.size()),
-         level.max_error, level.lower_bound, level.num_proved,
-         PointIds(model_, built, level.removal.observations)});
-  }
-  summary.elbow = profile.elbow;
-  summary.seconds = timer.Seconds();
-  summary_.noise = NoiseSummary{profile.noise, profile.levels[0].max_error,
-                                profile.levels[0].lower_bound};
-  size_t chosen = profile.levels.size() - 1;
-  if (!options_.max_error) {
-    if (!profile.elbow) return std::nullopt;
-    chosen = *profile.elbow;
-    bound_.max_error = profile.noise.max_error;
-  }
-  for (Conflict& conflict : profile.conflicts) {
-    if (conflict.proof.lower_bound > bound_.max_error) {
-      found->push_back(std::move(conflict));
+    summary.elbow = profile.elbow;
+    summary.seconds = timer.Seconds();
+    summary_.noise = NoiseSummary{profile.noise, profile.levels[0].max_error,
+                                  profile.levels[0].lower_bound};
+    size_t chosen = profile.levels.size() - 1;
+    if (!options_.max_error) {
+      if (!profile.elbow) return std::nullopt;
+      chosen = *profile.elbow;
+      bound_.max_error = profile.noise.max_error;
     }
-  }
-  return std::move(profile.levels[chosen].removal);
-}
-
-void OutlierFilter::Pack(const BuiltProblem& built, const Removal& removal,
-                         std::vector<Conflict> found,
-                         const std::vector<uint64_t>& elements) {
-  const Timer timer;
-  ConflictPacking packing = PackAgainstRemoval(model_, built, bound_, removal,
-                                               std::move(found), context_);
-  std::vector<Conflict>& conflicts = packing.conflicts;
-  summary_.is_search_complete = packing.is_complete;
-  if (context_.IsCancelled()) return;
-  summary_.rotation_suspect =
-      FindRotationSuspect(model_, built, bound_, conflicts, removal, context_);
-  std::vector<PixelCertificate> proofs;
-  for (Conflict& conflict : conflicts) {
-    for (const int64_t i : conflict.observations) {
-      conflict_of_[elements[i]] = summary_.num_proved;
-    }
-    ++summary_.num_proved;
-    summary_.num_irreducible += conflict.is_irreducible;
-    proofs.push_back(std::move(conflict.proof));
-  }
-  summary_.conflicts = DescribeConflicts(model_, built, options_.solve.norm,
-                                         bound_.max_error, proofs);
-  summary_.seconds_conflicts = timer.Seconds();
-}
-
-// Solves what is left of a model that differs from the input in translations
-// and points alone.
-void OutlierFilter::Solve(Model moved) {
-  const Timer timer;
-  kept_ = RemoveObservations(moved, is_removed_);
-  if (!kept_.model.track_elements.empty()) {
-    // If all that is left can be within the bound, its least squares below
-    // that.
-    SolveModelOptions options = options_.solve;
-    options.init = SolveInit::kModel;
-    options.polish = Polish::kNone;
-    options.finish.max_error = bound_.max_error;
-    SolveModelResult solved = SolveModel(kept_.model, options, context_);
-    kept_.model = std::move(solved.model);
-    summary_.solve = std::move(solved.summary);
-    ++summary_.num_solves;
-  }
-  summary_.seconds_solve += timer.Seconds();
-}
-
-// Removes what is above the bound in the solved model. Returns whether any was.
-bool OutlierFilter::RemoveAbove() {
-  const std::vector<double> errors =
-      PixelErrors(kept_.model, context_.num_threads);
-  bool is_any = false;
-  for (size_t n = 0; n < errors.size(); ++n) {
-    if (IsWithin(errors[n])) continue;
-    is_removed_[kept_.element_of[n]] = 1;
-    is_any = true;
-  }
-  return is_any;
-}
-
-// Looks for weakly tied parts in the solved model, by all tracks of the input.
-void OutlierFilter::FindWeakParts(const BuiltProblem& built) {
-  Estimate estimate = built.start;
-  for (size_t f = 0; f < built.frame_of.size(); ++f) {
-    estimate.translations[f] =
-        kept_.model.frames[built.frame_of[f]].rig_from_world.translation;
-  }
-  for (const WeakLink& link :
-       FindWeakLinks(built.problem, estimate,
-                     kCapOfPoints * std::min(bound_.max_error, kLevelOfStart),
-                     context_)) {
-    WeakPart& part = summary_.weak_parts.emplace_back();
-    for (size_t v = 0; v < built.image_of.size(); ++v) {
-      if (std::binary_search(link.frames.begin(), link.frames.end(),
-                             built.problem.views[v].frame)) {
-        part.image_names.push_back(model_.images[built.image_of[v]].name);
+    for (Conflict& conflict : profile.conflicts) {
+      if (conflict.proof.lower_bound > bound_.max_error) {
+        found->push_back(std::move(conflict));
       }
     }
-    part.num_tracks = link.num_tracks;
-    part.num_agreeing = link.num_agreeing;
-    part.scale_factor = link.scale_factor;
-    part.is_held = link.IsHeld();
-    part.turn_deg = link.turn_deg;
-    part.num_agreeing_turned = link.num_agreeing_turned;
+    return std::move(profile.levels[chosen].removal);
   }
-}
 
-void OutlierFilter::FilterByConflicts() {
-  const RemovalStart start = FindRemovalStart(model_, options_, context_);
-  const BuiltProblem& built = start.built;
-  summary_.init = start.init;
-  if (options_.spares_what_fits &&
-      (start.fits_its_positions || start.nearly_fits)) {
-    is_given_back_ = summary_.is_spared = true;
-    bound_.max_error = start.fits_its_positions ? 0 : start.max_error;
-    return;
+  void MeasureNoise(const BuiltProblem& built) {
+    NoiseSummary& noise = summary_.noise.emplace();
+    noise.limit = FindNoiseLimit(model_, built, bound_.norm, context_);
+    const OptimumWithout lowest =
+        SolveWithout(model_, built, {}, built.start, bound_.norm,
+                     context_.Within("comparing the errors with noise"));
+    noise.lowest_max_error = lowest.max_error;
+    noise.lower_bound = lowest.lower_bound;
   }
-  bound_.max_error = start.max_error;
-  summary_.is_bound_beyond_reason =
-      !options_.max_error && start.max_error > options_.solve.init_max_error;
-  const std::vector<uint64_t> elements = ElementsOf(model_, built);
-  std::vector<Conflict> found;
-  const std::optional<Removal> removal = RemoveFew(built, &found);
-  if (context_.IsCancelled()) return;
-  if (!removal) {
-    is_given_back_ = true;
-    summary_.conflicts = DescribeConflicts(model_, built, options_.solve.norm,
-                                           summary_.noise->limit.max_error, {});
-    return;
-  }
-  for (const int64_t i : removal->observations) is_removed_[elements[i]] = 1;
-  if (options_.find_conflicts) {
-    Pack(built, *removal, std::move(found), elements);
-  }
-  if (options_.on_removed) {
-    options_.on_removed(static_cast<int64_t>(removal->observations.size()));
-  }
-  Model moved;
-  PlaceAt(built, *removal, &moved);
-  Solve(std::move(moved));
-  if (start.init == SolveInit::kFeasible && !context_.IsCancelled()) {
-    FindWeakParts(built);
-  }
-  // Observations that had no part in the problem may still be above the bound.
-  if (!RemoveAbove()) return;
-  Model solved = std::move(kept_.model);
-  std::vector<char> is_gone(solved.track_elements.size());
-  for (size_t n = 0; n < is_gone.size(); ++n) {
-    is_gone[n] = is_removed_[kept_.element_of[n]];
-  }
-  RemovedObservations rest = RemoveObservations(solved, is_gone);
-  for (uint64_t& e : rest.element_of) e = kept_.element_of[e];
-  rest.num_left_alone += kept_.num_left_alone;
-  rest.num_points += kept_.num_points;
-  kept_ = std::move(rest);
-}
 
-void OutlierFilter::FilterByThreshold() {
-  for (size_t e = 0; e < errors_before_.size(); ++e) {
-    is_removed_[e] = !IsWithin(errors_before_[e]);
+  void Pack(const BuiltProblem& built, const Removal& removal,
+            std::vector<Conflict> found,
+            const std::vector<uint64_t>& elements) {
+    const Timer timer;
+    ConflictPacking packing = PackAgainstRemoval(model_, built, bound_, removal,
+                                                 std::move(found), context_);
+    summary_.is_search_complete = packing.is_complete;
+    if (context_.IsCancelled()) return;
+    summary_.rotation_suspect = FindRotationSuspect(
+        model_, built, bound_, packing.conflicts, removal, context_);
+    TakeConflicts(built, elements, bound_, std::move(packing.conflicts));
+    summary_.seconds_conflicts = timer.Seconds();
   }
-  Model moved = model_;
-  do {
-    Solve(moved);
-  } while (!context_.IsCancelled() &&
-           summary_.num_solves < kMaxThresholdSolves && RemoveAbove());
-}
 
-OutlierFilterResult OutlierFilter::Run() {
-  summary_.method = options_.method;
-  summary_.norm = options_.solve.norm;
-  summary_.num_observations =
-      static_cast<int64_t>(model_.track_elements.size());
-  summary_.num_points = static_cast<int64_t>(model_.points3D.size());
-  summary_.pixel_error_before = Summarize(errors_before_);
-  if (options_.method == OutlierMethod::kConflicts) {
-    FilterByConflicts();
-  } else {
-    FilterByThreshold();
+  // Moves a copy of the input to the removal's estimate, in the input's frame.
+  void PlaceAt(const BuiltProblem& built, const Removal& removal,
+               Model* moved) {
+    Estimate placed = removal.estimate;
+    const ProblemSubset part(built.problem,
+                             AllBut(removal.observations, built.pixels.size()));
+    Estimate own = part.Restrict(placed);
+    RestoreGaugeIfHarmless(part.problem(), part.Restrict(built.start),
+                           options_.solve.norm, context_, &own);
+    part.Replace(own, &placed);
+    *moved = ApplyEstimate(model_, built, placed);
   }
-  summary_.max_error = bound_.max_error;
-  if (context_.IsCancelled()) return {model_, std::move(summary_)};
-  if (is_given_back_) {
-    summary_.is_within = true;
-    summary_.pixel_error_after = summary_.pixel_error_before;
-    return {model_, std::move(summary_)};
+
+  // Solves what is left of a model that differs from the input in translations
+  // and points alone.
+  void Solve(Model moved) {
+    const Timer timer;
+    kept_ = RemoveObservations(moved, is_removed_);
+    if (!kept_.model.track_elements.empty()) {
+      // If all that is left can be within the bound, its least squares below
+      // that.
+      SolveModelOptions options = options_.solve;
+      options.init = SolveInit::kModel;
+      options.polish = Polish::kNone;
+      options.finish.max_error = bound_.max_error;
+      SolveModelResult solved = SolveModel(kept_.model, options, context_);
+      kept_.model = std::move(solved.model);
+      summary_.solve = std::move(solved.summary);
+      ++summary_.num_solves;
+    }
+    summary_.seconds_solve += timer.Seconds();
   }
-  const std::vector<double> errors =
-      PixelErrors(kept_.model, context_.num_threads);
-  UpdatePointErrors(errors, &kept_.model);
-  summary_.pixel_error_after = Summarize(errors);
-  summary_.is_within =
-      std::all_of(errors.begin(), errors.end(),
-                  [this](double error) { return IsWithin(error); });
-  summary_.num_left_alone = kept_.num_left_alone;
-  summary_.num_points_removed = kept_.num_points;
-  summary_.removed = ListRemoved(model_, kept_.model, errors_before_,
-                                 is_removed_, conflict_of_, context_);
-  RankSuspects(model_, is_removed_, conflict_of_, &summary_);
-  if (options_.solve.polish != Polish::kNone && summary_.solve) {
-    summary_.solve->polish =
-        PolishModel(options_.solve.polish, options_.solve.finish.loss,
-                    options_.solve.problem.fixed, context_, &kept_.model);
+
+  // Removes what is above the bound in the solved model. Returns whether any
+  // was.
+  bool RemoveAbove() {
+    const std::vector<double> errors =
+        PixelErrors(kept_.model, context_.num_threads);
+    bool is_any = false;
+    for (size_t n = 0; n < errors.size(); ++n) {
+      if (IsWithin(errors[n])) continue;
+      is_removed_[kept_.element_of[n]] = 1;
+      is_any = true;
+    }
+    return is_any;
   }
-  return {std::move(kept_.model), std::move(summary_)};
-}
+
+  // Looks for weakly tied parts in the solved model, by all tracks of the
+  // input.
+  void FindWeakParts(const BuiltProblem& built) {
+    Estimate estimate = built.start;
+    for (size_t f = 0; f < built.frame_of.size(); ++f) {
+      estimate.translations[f] =
+          kept_.model.frames[built.frame_of[f]].rig_from_world.translation;
+    }
+    for (const WeakLink& link :
+         FindWeakLinks(built.problem, estimate,
+                       kCapOfPoints * std::min(bound_.max_error, kLevelOfStart),
+                       context_)) {
+      WeakPart& part = summary_.weak_parts.emplace_back();
+      for (size_t v = 0; v < built.image_of.size(); ++v) {
+        if (std::binary_search(link.frames.begin(), link.frames.end(),
+                               built.problem.views[v].frame)) {
+          part.image_names.push_back(model_.images[built.image_of[v]].name);
+        }
+      }
+      part.num_tracks = link.num_tracks;
+      part.num_agreeing = link.num_agreeing;
+      part.scale_factor = link.scale_factor;
+      part.is_held = link.IsHeld();
+      part.turn_deg = link.turn_deg;
+      part.num_agreeing_turned = link.num_agreeing_turned;
+    }
+  }
+
+  ErrorBound bound_;
+  bool is_given_back_ = false;  // nothing is removed, the model is the input
+};
 
 }  // namespace
 
@@ -384,6 +312,73 @@ OutlierFilterResult FilterOutliers(const Model& model,
       result.summary.noise && result.summary.max_error == 0;
   if (is_given_back) result.model = model;  // to the last bit
   return result;
+}
+
+namespace {
+
+// Whether observations may be removed if no start satisfies all.
+bool AllowsRemoval(const SolveModelOptions& options) {
+  return !options.problem.fixed.Any() && options.problem.positions.empty() &&
+         EffectiveMethod(options) == SolveMethod::kAuto && options.norm.p == 2;
+}
+
+TolerantSolveResult SolveWithoutOutliers(const Model& model,
+                                         const TolerantSolveOptions& options,
+                                         bool spares_what_fits,
+                                         const Context& context) {
+  OutlierFilterOptions filter = options;
+  filter.spares_what_fits = spares_what_fits;
+  filter.solve.on_built = nullptr;
+  filter.solve.find_lowest = options.solve.describe_certificate;
+  OutlierFilterResult filtered = FilterOutliers(model, filter, context);
+  TolerantSolveResult result;
+  if (filtered.summary.solve) {
+    result.summary = *std::exchange(filtered.summary.solve, std::nullopt);
+    result.summary.init = filtered.summary.init;
+    result.summary.pixel_error_before = filtered.summary.pixel_error_before;
+    result.summary.pixel_error_after = filtered.summary.pixel_error_after;
+  } else {
+    result.summary.termination = context.IsCancelled()
+                                     ? SolveTermination::kInterrupted
+                                     : SolveTermination::kNothingToSolve;
+  }
+  result.model = std::move(filtered.model);
+  result.outliers = std::move(filtered.summary);
+  return result;
+}
+
+}  // namespace
+
+TolerantSolveResult SolveTolerantly(const Model& model,
+                                    const TolerantSolveOptions& options,
+                                    const Context& context) {
+  if (options.max_error) {
+    return SolveWithoutOutliers(model, options, false, context);
+  }
+  SolveModelOptions solve = options.solve;
+  const bool allows_removal = AllowsRemoval(solve);
+  if (!allows_removal || solve.init != SolveInit::kFeasible ||
+      solve.describe_certificate) {
+    SolveModelResult solved = SolveModel(model, solve, context);
+    if (!allows_removal ||
+        solved.summary.termination != SolveTermination::kNothingToSolve) {
+      return {std::move(solved.model), std::move(solved.summary), std::nullopt};
+    }
+  }
+  TolerantSolveResult result =
+      SolveWithoutOutliers(model, options, true, context);
+  if (!result.outliers->is_spared) return result;
+  // Perhaps all observations can stay: the lowest maximum tells.
+  solve.init = SolveInit::kFeasible;
+  SolveModelResult solved = SolveModel(model, solve, context);
+  const SolveTermination ended = solved.summary.termination;
+  const double explained = result.outliers->max_error;
+  if (ended == SolveTermination::kNoStart ||
+      ended == SolveTermination::kInfeasible ||
+      (explained > 0 && solved.summary.lower_bound.value_or(0) > explained)) {
+    return SolveWithoutOutliers(model, options, false, context);
+  }
+  return {std::move(solved.model), std::move(solved.summary), std::nullopt};
 }
 
 }  // namespace krot::internal

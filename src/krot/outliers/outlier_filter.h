@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "krot/convert/pixel_certificate.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"
+#include "krot/model/derived_models.h"
 #include "krot/outliers.h"
 #include "krot/outliers/conflict.h"
 #include "krot/outliers/removal.h"
@@ -41,20 +43,12 @@ struct NoiseLimit {
 NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
                           Norm norm, const Context& context);
 
-// The same with the cameras of built.start alone. O(observations).
-NoiseLimit NoiseLimitAtStart(const Model& model, const BuiltProblem& built,
-                             Norm norm, const Context& context);
-
 struct ErrorProfileOptions {
   Norm norm;
   // The largest error of the last level, true pixels; > 0. None: half of the
   // first level's or, if that is lower and the first level is proved to be
   // above it, what noise explains.
   std::optional<double> max_error;
-  double relative_gap = 1e-3;  // of every level; > 0
-  int num_levels = 6;          // about, below the first; >= 1
-  // For levels that remove more observations no new conflicts are looked for.
-  size_t max_charged = 50;
 };
 
 struct ProfileLevel {
@@ -83,8 +77,8 @@ struct ErrorProfile {
 };
 
 // Goes from one optimum to the next: observations are removed for a bound below
-// it (RemovalSearch), in equal ratios down to the last level, with a stop at
-// what noise explains, and the rest is solved anew (SolveInRounds).
+// it (RemovalSearch), in about six equal ratios down to the last level, with a
+// stop at what noise explains, and the rest is solved anew (SolveWithout).
 // Observations that are left alone in their tracks hold nothing and do not
 // count. If cancelled, it returns the levels so far. Every level takes about as
 // long as two solves.
@@ -113,7 +107,7 @@ struct OutlierFilterOptions {
   // is what noise explains (FindNoiseLimit), provided that it is proved that no
   // estimate brings all errors below that; otherwise nothing is removed, and
   // the model stays as it is. From nothing, without a profile, it is what noise
-  // explains at the start (NoiseLimitAtStart).
+  // explains at the start (FindRemovalStart).
   std::optional<double> max_error;
   // Whether the model's own positions were made from rotations and tracks
   // alone: then weakly tied parts are looked for, too.
@@ -227,5 +221,115 @@ struct OutlierFilterResult {
 OutlierFilterResult FilterOutliers(const Model& model,
                                    const OutlierFilterOptions& options,
                                    const Context& context);
+
+// Colours that colour-blind readers can tell apart [Okabe and Ito].
+inline constexpr std::array<uint8_t, 3> kRemovedColor = {213, 94, 0};
+inline constexpr std::array<uint8_t, 3> kConflictColor = {0, 114, 178};
+inline constexpr std::array<uint8_t, 3> kUnsuspectedColor = {190, 190, 190};
+
+// For COLMAP's GUI: colours every point of the filtered model: vermilion if an
+// observation of its track was removed, blue if its track only takes part in a
+// conflict, otherwise light grey. O(points + conflicts).
+void ColorSuspects(const OutlierFilterSummary& summary, Model* model);
+
+// What all ways to filter have in common: which observations of a model are
+// removed, what is kept of it, and the summary.
+class Filtering {
+ protected:
+  Filtering(const Model& model, const OutlierFilterOptions& options,
+            const Context& context);
+
+  // Removes more of what is kept: what is marked, by track element of kept_.
+  void RemoveMore(const std::vector<char>& is_gone);
+  // Takes conflicts, proved for a problem that was built from the model, into
+  // the summary. `elements` are the problem's track elements (ElementsOf).
+  void TakeConflicts(const BuiltProblem& built,
+                     const std::vector<uint64_t>& elements,
+                     const ErrorBound& bound, std::vector<Conflict> conflicts);
+  // Completes the summary, but for is_within. Returns the errors of what is
+  // kept. O(observations).
+  std::vector<double> Describe();
+
+  const Model& model_;
+  const OutlierFilterOptions& options_;
+  const Context& context_;
+  // Per track element of the model: its error, whether it was removed, the
+  // conflict that it is in (-1: none) and its w when it was removed, unless the
+  // last is empty.
+  const std::vector<double> errors_before_;
+  std::vector<char> is_removed_;
+  std::vector<int64_t> conflict_of_;
+  std::vector<double> w_;
+  RemovedObservations kept_;
+  OutlierFilterSummary summary_;
+};
+
+// FilterOutliers with OutlierMethod::kSnooping, which needs no bound. It works
+// in rounds: with the cameras fixed, observations that noise does not explain
+// are removed (SnoopNoise); then translations and points move to the least
+// squares of the rest, or to the minimum of the robust loss
+// options.solve.finish.loss, with rotations and intrinsics fixed. Rounds end
+// when nothing is removed. If nothing ever is, or if no sigma can be estimated,
+// as in a model without poses, the model is a copy of the input.
+//
+// Then conflicts are looked for. The bound of each observation is what noise
+// explains of it: critical_w sigma sqrt(r), with r the larger eigenvalue of its
+// R_ii (krot/check.h) in its track as it was read. The removal is enough for
+// all others to keep their bounds, and noise alone has no conflict with
+// probability 95 %.
+//
+// The same bits at any number of threads. Throws ModelError for cameras without
+// an image plane.
+OutlierFilterResult FilterBySnooping(const Model& model,
+                                     const OutlierFilterOptions& options,
+                                     const Context& context);
+
+// Where the search for observations to remove starts.
+struct RemovalStart {
+  // All observations that the start can serve. Depths at built.start need not
+  // be positive if the start is from nothing.
+  BuiltProblem built;
+  SolveInit init = SolveInit::kModel;
+  double max_error = 0;  // the bound, given or chosen; 0: noise is to choose
+  // From nothing without a bound: the start's largest error is not far above
+  // what noise explains, so that perhaps no observation has to go.
+  bool nearly_fits = false;
+  // From nothing without a bound: the model has positions that were made with
+  // these rotations; noise explains half of their errors, and none exceeds
+  // init_max_error.
+  bool fits_its_positions = false;
+};
+
+// Starts from the model or, if options.solve.init says so or the model has no
+// start of its own (HasOwnStart), from FindRobustStart. Chooses the bound, too.
+RemovalStart FindRemovalStart(const Model& model,
+                              const OutlierFilterOptions& options,
+                              const Context& context);
+
+// SolveModel for models with observations that cannot be satisfied: what `krot
+// solver` does between reading and writing.
+//
+// With max_error a few observations are removed so that all others keep it.
+// Without it all stay, unless the start is from nothing and noise does not
+// explain the lowest maximum (RemovalStart); then the observations that noise
+// does not explain are removed. If a certificate is asked for, this is only so
+// for a model of which SolveModel serves no observation.
+
+struct TolerantSolveOptions : OutlierFilterOptions {
+  TolerantSolveOptions() { find_conflicts = false; }
+};
+
+struct TolerantSolveResult {
+  // A copy of the input if there is nothing to solve or no start.
+  Model model;
+  SolveSummary summary;
+  // If observations were removed. Its solve is moved to the summary above.
+  std::optional<OutlierFilterSummary> outliers;
+};
+
+// Requires and throws what SolveModel and FilterOutliers do.
+TolerantSolveResult SolveTolerantly(const Model& model,
+                                    const TolerantSolveOptions& options,
+                                    const Context& context = {});
 
 }  // namespace krot::internal

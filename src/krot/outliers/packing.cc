@@ -15,14 +15,6 @@
 namespace krot::internal {
 namespace {
 
-// Of the open observations, so many with the largest errors are tried in more
-// frames.
-constexpr size_t kMaxForMoreFrames = 400;
-// If more observations are tight, no conflicts are looked for among them.
-constexpr size_t kMaxTight = 250;
-// Open observations that look for a conflict at the same time.
-constexpr size_t kBatch = 16;
-
 class Packing {
  public:
   Packing(const Model& model, const BuiltProblem& built,
@@ -45,17 +37,62 @@ class Packing {
     for (Conflict& conflict : found) Take(std::move(conflict));
   }
 
-  ConflictPacking Run();
+  ConflictPacking Run() {
+    const Reprojection reprojection(model_, built_);
+    std::vector<std::pair<double, int64_t>> by_error;
+    for (const int64_t i : removal_.observations) {
+      if (IsTaken(i)) continue;
+      by_error.emplace_back(
+          reprojection.Error(removal_.estimate, bound_.norm, i), i);
+    }
+    std::sort(by_error.begin(), by_error.end());
+    std::vector<int64_t> open;
+    for (const auto& [error, i] : by_error) open.push_back(i);
+    Charge(&open);
+    for (const int64_t i : open) is_free_[i] = 1;
+    Charge(&open);
+    ChargeTight();
+    return {std::move(conflicts_), is_complete_};
+  }
 
  private:
-  int32_t FrameOf(int64_t i) const {
-    return problem_.views[problem_.observations[i].view].frame;
+  // Whether a point brings observation i and its other observations in the
+  // frames within the bound, the frames fixed. All observations that stay are
+  // within it, too, so that there is no conflict with them in these frames.
+  bool FitsIn(int64_t i, const std::vector<int32_t>& frames) const {
+    const int32_t k = problem_.observations[i].point;
+    std::vector<int64_t> observations;
+    for (const int64_t j : problem_.OfPoint(k)) {
+      const bool is_there = std::find(frames.begin(), frames.end(),
+                                      problem_.FrameOf(j)) != frames.end() ||
+                            problem_.FrameOf(j) == problem_.FrameOf(i);
+      if (j == i || (is_free_[j] && is_there)) observations.push_back(j);
+    }
+    const ProblemSubset subset(problem_, std::move(observations));
+    Estimate estimate = subset.Restrict(removal_.estimate);
+    return BlockSweep(subset.problem(), FastDescentOptions(), bound_.norm,
+                      small_context_)
+               .IntersectPoints(&estimate) <= bound_.max_error;
   }
-  bool FitsIn(int64_t i, const std::vector<int32_t>& frames) const;
+
+  // Looks for a conflict in the connected part of `near` (ascending) with i.
   std::optional<Conflict> Refute(int64_t i, const std::vector<int64_t>& near,
-                                 Work* work) const;
+                                 Work* work) const {
+    for (const std::vector<int64_t>& part :
+         SplitIntoComponents(problem_, PruneUnconstrained(problem_, near))) {
+      if (!std::binary_search(part.begin(), part.end(), i)) continue;
+      return FindConflict(model_, built_, bound_, part, small_context_, work);
+    }
+    return std::nullopt;
+  }
+
+  // Looks for a conflict of observation i in its frame and others.
   std::optional<Conflict> Try(int64_t i, const std::vector<int32_t>& frames,
-                              Work* work) const;
+                              Work* work) const {
+    if (FitsIn(i, frames)) return std::nullopt;
+    return Refute(i, neighbourhoods_.Around(i, frames, is_free_), work);
+  }
+
   bool Prove(Conflict* conflict, Work* work) const {
     return ProveConflict(model_, built_, bound_, small_context_, conflict,
                          work);
@@ -69,14 +106,144 @@ class Packing {
     return is_complete_ && !context_.IsCancelled();
   }
   bool IsTaken(int64_t i) const { return is_taken_[i] != 0; }
+
   std::optional<Conflict> InTwoViews(int64_t i, const std::vector<float>& worth,
-                                     Work* work) const;
-  void ChargeInTwoViews(std::vector<int64_t>* open);
-  bool Charge(int64_t i, int num_others);
-  void ChargeInFrames(std::vector<int64_t>* open);
-  void Charge(std::vector<int64_t>* open);
-  void ChargeTight();
-  void Take(Conflict conflict);
+                                     Work* work) const {
+    std::vector<std::vector<int64_t>> sets;
+    const Observation& own = problem_.observations[i];
+    for (const int64_t j : problem_.OfPoint(own.point)) {
+      const bool is_twin = j != i && problem_.observations[j].view == own.view;
+      if (is_twin && worth[j] > 0) {
+        sets.push_back({std::min(i, j), std::max(i, j)});
+      }
+    }
+    for (std::vector<int64_t>& set : two_views_.Candidates(i, worth)) {
+      sets.push_back(std::move(set));
+    }
+    for (const std::vector<int64_t>& set : sets) {
+      std::optional<Conflict> conflict = Refute(i, set, work);
+      if (conflict && Prove(&*conflict, work)) return conflict;
+    }
+    return std::nullopt;
+  }
+
+  // Observations left in `open` found no conflict. Those whose conflict shares
+  // observations with one found at the same time search again.
+  void ChargeInTwoViews(std::vector<int64_t>* open) {
+    std::vector<int64_t> queue(open->rbegin(), open->rend());
+    std::vector<int64_t> left;
+    while (!queue.empty() && MayGoOn()) {
+      std::vector<int64_t> batch;
+      while (batch.size() < 16 && !queue.empty()) {
+        if (!IsTaken(queue.back())) batch.push_back(queue.back());
+        queue.pop_back();
+      }
+      std::vector<int64_t> all = queue;
+      all.insert(all.end(), batch.begin(), batch.end());
+      const std::vector<float> worth = Worths(problem_, is_free_, all);
+      std::vector<std::optional<Conflict>> found(batch.size());
+      std::vector<Work> work(batch.size());
+      ParallelFor(static_cast<int64_t>(batch.size()), 1, context_.num_threads,
+                  [&](int64_t n, int64_t, int) {
+                    found[n] = InTwoViews(batch[n], worth, &work[n]);
+                  });
+      for (const Work& own : work) work_.done += own.done;
+      std::vector<int64_t> again;
+      for (size_t n = 0; n < batch.size(); ++n) {
+        if (!found[n]) {
+          left.push_back(batch[n]);
+        } else if (std::any_of(found[n]->observations.begin(),
+                               found[n]->observations.end(),
+                               [this](int64_t i) { return IsTaken(i); })) {
+          again.push_back(batch[n]);
+        } else {
+          Take(*std::move(found[n]));
+        }
+      }
+      queue.insert(queue.end(), again.rbegin(), again.rend());
+    }
+    left.insert(left.end(), queue.rbegin(), queue.rend());
+    *open = std::move(left);
+  }
+
+  // Looks in all sets of frames at once and takes the smallest conflict that is
+  // proved.
+  bool Charge(int64_t i, int num_others) {
+    const std::vector<std::vector<int32_t>> sets =
+        neighbourhoods_.FrameSets(i, num_others, is_free_);
+    std::vector<std::optional<Conflict>> found(sets.size());
+    std::vector<Work> work(sets.size());
+    ParallelFor(
+        static_cast<int64_t>(sets.size()), 1, context_.num_threads,
+        [&](int64_t n, int64_t, int) { found[n] = Try(i, sets[n], &work[n]); });
+    for (const Work& own : work) work_.done += own.done;
+    std::vector<std::pair<size_t, size_t>> smallest_first;
+    for (size_t n = 0; n < found.size(); ++n) {
+      if (found[n])
+        smallest_first.emplace_back(found[n]->observations.size(), n);
+    }
+    std::sort(smallest_first.begin(), smallest_first.end());
+    for (const auto& [size, n] : smallest_first) {
+      if (!Prove(&*found[n], &work_)) continue;
+      Take(*std::move(found[n]));
+      return true;
+    }
+    return false;
+  }
+
+  // Observations left in `open` found no conflict. Only those with the largest
+  // errors are tried: others hardly ever find a conflict in more frames.
+  void ChargeInFrames(std::vector<int64_t>* open) {
+    for (const int num_others : {2, 3}) {
+      std::vector<int64_t> left;
+      const size_t first = open->size() - std::min<size_t>(open->size(), 400);
+      for (size_t n = 0; n < open->size(); ++n) {
+        const int64_t i = (*open)[n];
+        if (IsTaken(i)) continue;
+        const bool is_tried = n >= first && MayGoOn();
+        if (!is_tried || !Charge(i, num_others)) left.push_back(i);
+      }
+      *open = std::move(left);
+    }
+  }
+
+  // Conflicts of two views are the smallest, but take three observations of the
+  // open one's view; conflicts of more views may take two, so crowded views try
+  // these first.
+  void Charge(std::vector<int64_t>* open) {
+    std::vector<int64_t> crowded = TakeCrowded(problem_, is_free_, open);
+    ChargeInFrames(&crowded);
+    ChargeInTwoViews(open);
+    ChargeInTwoViews(&crowded);
+    ChargeInFrames(open);
+    open->insert(open->begin(), crowded.begin(), crowded.end());
+  }
+
+  void ChargeTight() {
+    std::vector<int64_t> tight;
+    for (const int64_t i : removal_.tight) {
+      if (is_free_[i]) tight.push_back(i);
+    }
+    if (tight.empty() || tight.size() > 250 || !MayGoOn()) return;
+    const ProblemSubset subset(problem_, tight);
+    const BuiltProblem part = BuiltPart(built_, subset, built_.start);
+    std::vector<int64_t> all(tight.size());
+    std::iota(all.begin(), all.end(), 0);
+    for (Conflict& conflict :
+         PackConflicts(model_, part, bound_, all, small_context_, &work_)) {
+      conflict.observations = subset.InWhole(std::move(conflict.observations));
+      conflict.proof.rows = InWhole(subset, std::move(conflict.proof.rows));
+      Take(std::move(conflict));
+    }
+  }
+
+  void Take(Conflict conflict) {
+    for (const int64_t i : conflict.observations) {
+      is_free_[i] = 0;
+      is_taken_[i] = 1;
+    }
+    conflicts_.push_back(std::move(conflict));
+  }
 
   const Model& model_;
   const BuiltProblem& built_;
@@ -93,204 +260,6 @@ class Packing {
   const TwoViewConflicts two_views_;
   std::vector<Conflict> conflicts_;
 };
-
-// Whether a point brings observation i and its other observations in the frames
-// within the bound, the frames fixed. All observations that stay are within it,
-// too, so that there is no conflict with them in these frames.
-bool Packing::FitsIn(int64_t i, const std::vector<int32_t>& frames) const {
-  const int32_t k = problem_.observations[i].point;
-  std::vector<int64_t> observations;
-  for (int64_t j = problem_.point_begin[k]; j < problem_.point_begin[k + 1];
-       ++j) {
-    const bool is_there =
-        std::find(frames.begin(), frames.end(), FrameOf(j)) != frames.end() ||
-        FrameOf(j) == FrameOf(i);
-    if (j == i || (is_free_[j] && is_there)) observations.push_back(j);
-  }
-  const ProblemSubset subset(problem_, std::move(observations));
-  Estimate estimate = subset.Restrict(removal_.estimate);
-  return BlockSweep(subset.problem(), FastDescentOptions(), bound_.norm,
-                    small_context_)
-             .IntersectPoints(&estimate) <= bound_.max_error;
-}
-
-// Looks for a conflict in the connected part of `near` (ascending) that has i.
-std::optional<Conflict> Packing::Refute(int64_t i,
-                                        const std::vector<int64_t>& near,
-                                        Work* work) const {
-  for (const std::vector<int64_t>& part :
-       SplitIntoComponents(problem_, PruneUnconstrained(problem_, near))) {
-    if (!std::binary_search(part.begin(), part.end(), i)) continue;
-    return FindConflict(model_, built_, bound_, part, small_context_, work);
-  }
-  return std::nullopt;
-}
-
-// Looks for a conflict of observation i in its frame and others.
-std::optional<Conflict> Packing::Try(int64_t i,
-                                     const std::vector<int32_t>& frames,
-                                     Work* work) const {
-  if (FitsIn(i, frames)) return std::nullopt;
-  return Refute(i, neighbourhoods_.Around(i, frames, is_free_), work);
-}
-
-void Packing::Take(Conflict conflict) {
-  for (const int64_t i : conflict.observations) {
-    is_free_[i] = 0;
-    is_taken_[i] = 1;
-  }
-  conflicts_.push_back(std::move(conflict));
-}
-
-std::optional<Conflict> Packing::InTwoViews(int64_t i,
-                                            const std::vector<float>& worth,
-                                            Work* work) const {
-  std::vector<std::vector<int64_t>> sets;
-  const Observation& own = problem_.observations[i];
-  for (int64_t j = problem_.point_begin[own.point];
-       j < problem_.point_begin[own.point + 1]; ++j) {
-    const bool is_twin = j != i && problem_.observations[j].view == own.view;
-    if (is_twin && worth[j] > 0) {
-      sets.push_back({std::min(i, j), std::max(i, j)});
-    }
-  }
-  for (std::vector<int64_t>& set : two_views_.Candidates(i, worth)) {
-    sets.push_back(std::move(set));
-  }
-  for (const std::vector<int64_t>& set : sets) {
-    std::optional<Conflict> conflict = Refute(i, set, work);
-    if (conflict && Prove(&*conflict, work)) return conflict;
-  }
-  return std::nullopt;
-}
-
-// Observations left in `open` found no conflict. Those whose conflict shares
-// observations with one found at the same time search again.
-void Packing::ChargeInTwoViews(std::vector<int64_t>* open) {
-  std::vector<int64_t> queue(open->rbegin(), open->rend());
-  std::vector<int64_t> left;
-  while (!queue.empty() && MayGoOn()) {
-    std::vector<int64_t> batch;
-    while (batch.size() < kBatch && !queue.empty()) {
-      if (!IsTaken(queue.back())) batch.push_back(queue.back());
-      queue.pop_back();
-    }
-    std::vector<int64_t> all = queue;
-    all.insert(all.end(), batch.begin(), batch.end());
-    const std::vector<float> worth = Worths(problem_, is_free_, all);
-    std::vector<std::optional<Conflict>> found(batch.size());
-    std::vector<Work> work(batch.size());
-    ParallelFor(static_cast<int64_t>(batch.size()), 1, context_.num_threads,
-                [&](int64_t n, int64_t, int) {
-                  found[n] = InTwoViews(batch[n], worth, &work[n]);
-                });
-    for (const Work& own : work) work_.done += own.done;
-    std::vector<int64_t> again;
-    for (size_t n = 0; n < batch.size(); ++n) {
-      if (!found[n]) {
-        left.push_back(batch[n]);
-      } else if (std::any_of(found[n]->observations.begin(),
-                             found[n]->observations.end(),
-                             [this](int64_t i) { return IsTaken(i); })) {
-        again.push_back(batch[n]);
-      } else {
-        Take(*std::move(found[n]));
-      }
-    }
-    queue.insert(queue.end(), again.rbegin(), again.rend());
-  }
-  left.insert(left.end(), queue.rbegin(), queue.rend());
-  *open = std::move(left);
-}
-
-// Looks in all sets of frames at once and takes the smallest conflict that is
-// proved.
-bool Packing::Charge(int64_t i, int num_others) {
-  const std::vector<std::vector<int32_t>> sets =
-      neighbourhoods_.FrameSets(i, num_others, is_free_);
-  std::vector<std::optional<Conflict>> found(sets.size());
-  std::vector<Work> work(sets.size());
-  ParallelFor(
-      static_cast<int64_t>(sets.size()), 1, context_.num_threads,
-      [&](int64_t n, int64_t, int) { found[n] = Try(i, sets[n], &work[n]); });
-  for (const Work& own : work) work_.done += own.done;
-  std::vector<std::pair<size_t, size_t>> smallest_first;
-  for (size_t n = 0; n < found.size(); ++n) {
-    if (found[n]) smallest_first.emplace_back(found[n]->observations.size(), n);
-  }
-  std::sort(smallest_first.begin(), smallest_first.end());
-  for (const auto& [size, n] : smallest_first) {
-    if (!Prove(&*found[n], &work_)) continue;
-    Take(*std::move(found[n]));
-    return true;
-  }
-  return false;
-}
-
-// Observations left in `open` found no conflict. Only those with the largest
-// errors are tried: others hardly ever find a conflict in more frames.
-void Packing::ChargeInFrames(std::vector<int64_t>* open) {
-  for (const int num_others : {2, 3}) {
-    std::vector<int64_t> left;
-    const size_t first =
-        open->size() - std::min(open->size(), kMaxForMoreFrames);
-    for (size_t n = 0; n < open->size(); ++n) {
-      const int64_t i = (*open)[n];
-      if (IsTaken(i)) continue;
-      const bool is_tried = n >= first && MayGoOn();
-      if (!is_tried || !Charge(i, num_others)) left.push_back(i);
-    }
-    *open = std::move(left);
-  }
-}
-
-// Conflicts of two views are the smallest, but take three observations of the
-// open one's view; conflicts of more views may take two, so crowded views try
-// these first.
-void Packing::Charge(std::vector<int64_t>* open) {
-  std::vector<int64_t> crowded = TakeCrowded(problem_, is_free_, open);
-  ChargeInFrames(&crowded);
-  ChargeInTwoViews(open);
-  ChargeInTwoViews(&crowded);
-  ChargeInFrames(open);
-  open->insert(open->begin(), crowded.begin(), crowded.end());
-}
-
-ConflictPacking Packing::Run() {
-  const Reprojection reprojection(model_, built_);
-  std::vector<std::pair<double, int64_t>> by_error;
-  for (const int64_t i : removal_.observations) {
-    if (IsTaken(i)) continue;
-    by_error.emplace_back(reprojection.Error(removal_.estimate, bound_.norm, i),
-                          i);
-  }
-  std::sort(by_error.begin(), by_error.end());
-  std::vector<int64_t> open;
-  for (const auto& [error, i] : by_error) open.push_back(i);
-  Charge(&open);
-  for (const int64_t i : open) is_free_[i] = 1;
-  Charge(&open);
-  ChargeTight();
-  return {std::move(conflicts_), is_complete_};
-}
-
-void Packing::ChargeTight() {
-  std::vector<int64_t> tight;
-  for (const int64_t i : removal_.tight) {
-    if (is_free_[i]) tight.push_back(i);
-  }
-  if (tight.empty() || tight.size() > kMaxTight || !MayGoOn()) return;
-  const ProblemSubset subset(problem_, tight);
-  const BuiltProblem part = BuiltPart(built_, subset, built_.start);
-  std::vector<int64_t> all(tight.size());
-  std::iota(all.begin(), all.end(), 0);
-  for (Conflict& conflict :
-       PackConflicts(model_, part, bound_, all, small_context_, &work_)) {
-    conflict.observations = subset.InWhole(std::move(conflict.observations));
-    conflict.proof.rows = InWhole(subset, std::move(conflict.proof.rows));
-    Take(std::move(conflict));
-  }
-}
 
 }  // namespace
 

@@ -35,11 +35,6 @@ class Neighbourhoods {
                               const std::vector<char>& is_free) const;
 
  private:
-  int32_t FrameOf(int64_t i) const {
-    return problem_.views[problem_.observations[i].view].frame;
-  }
-  Eigen::Vector3d Direction(int64_t i) const;
-  Eigen::Vector3d CentreOf(int64_t i) const;
   double Strain(int64_t i, int64_t j) const;
   void AddStrained(int32_t a, int32_t b, const std::vector<char>& is_free,
                    std::vector<int32_t>* points) const;
@@ -101,7 +96,6 @@ class TwoViewConflicts {
   void AppendTriples(const HalfPlane& violated,
                      const std::vector<HalfPlane>& planes, float worth,
                      std::vector<Candidate>* candidates) const;
-  Eigen::Vector3d CentreOf(int64_t i) const;
 
   const KnownRotationProblem& problem_;
   const Estimate& estimate_;
@@ -114,9 +108,6 @@ struct ConflictPacking {
   std::vector<Conflict> conflicts;
   bool is_complete = true;  // false: it ended at the limit of work
 };
-
-// Work per observation. An endoscope's model needs 1,300, most fewer than 300.
-inline constexpr int64_t kMostWork = 1500;
 
 // Packs disjoint conflicts so that as many removed observations as possible
 // have one of their own: each charges a removed observation with others that
@@ -138,10 +129,11 @@ inline constexpr int64_t kMostWork = 1500;
 //
 // Where hardly anything can be decided, as with wrong rotations, it ends with
 // the conflicts so far once it has done `work_per_observation` (Work) for each
-// observation of the problem.
+// observation of the problem. An endoscope's model needs 1,300, most fewer than
+// 300.
 ConflictPacking PackAgainstRemoval(
     const Model& model, const BuiltProblem& built, const ErrorBound& bound,
     const Removal& removal, std::vector<Conflict> found, const Context& context,
-    int64_t work_per_observation = kMostWork);
+    int64_t work_per_observation = 1500);
 
 }  // namespace krot::internal

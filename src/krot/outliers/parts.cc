@@ -19,12 +19,10 @@ Groups::Groups(const KnownRotationProblem& problem,
   std::vector<int32_t> frames;
   for (int32_t k = 0; k < problem.num_points; ++k) {
     frames.clear();
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
-      frames.push_back(FrameOf(problem, i));
+    for (const int64_t i : problem.OfPoint(k)) {
+      frames.push_back(problem.FrameOf(i));
     }
-    std::sort(frames.begin(), frames.end());
-    frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+    SortUnique(&frames);
     for (const int32_t frame : frames) sights_.push_back({frame, 1});
     begin_.push_back(static_cast<int64_t>(sights_.size()));
   }
@@ -194,11 +192,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// About so many pairs of tracks are tried for a place at a given scale, and
-// about so many pairs or triples for a place and a scale.
-constexpr int64_t kTriedPlaces = 60;
+// About so many pairs or triples of tracks are tried for a place and a scale.
 constexpr int64_t kProposals = 300;
-constexpr int kNewtonSteps = 5;
 
 // M^-1, where M may be singular.
 Matrix3d InverseOf(const Matrix3d& M) {
@@ -278,8 +273,7 @@ Place PlaceSearch::BestPlace(double scale) const {
   }
   Place best;
   best.scale = scale;
-  const int64_t stride =
-      std::max<int64_t>(1, count * (count - 1) / 2 / kTriedPlaces);
+  const int64_t stride = std::max<int64_t>(1, count * (count - 1) / 2 / 60);
   int64_t pair = 0;
   for (int64_t i = 0; i < count; ++i) {
     for (int64_t j = count > 1 ? i + 1 : i; j < count; ++j, ++pair) {
@@ -292,7 +286,7 @@ Place PlaceSearch::BestPlace(double scale) const {
       if (place.cost < best.cost) best = place;
     }
   }
-  for (int n = 0; n < kNewtonSteps; ++n) {
+  for (int n = 0; n < 5; ++n) {
     const Place moved = Improve(best);
     if (!(moved.cost < best.cost)) break;
     best = moved;
@@ -345,24 +339,18 @@ std::optional<Place> PlaceSearch::Propose() const {
   const auto count = static_cast<int64_t>(tracks.size());
   if (count < kStrongTracks) return std::nullopt;
   Place best;
-  const int64_t num_pairs = count * (count - 1) / 2;
-  const int64_t stride = std::max<int64_t>(1, num_pairs / kProposals);
-  int64_t pair = 0;
-  for (int64_t gap = count - 1; gap > 0; --gap) {
-    for (int64_t i = 0; i + gap < count; ++i, ++pair) {
-      if (pair % stride != 0) continue;
-      const Vector3d between_a = tracks[i]->a.x - tracks[i + gap]->a.x;
-      const Vector3d between_b = tracks[i]->b.x - tracks[i + gap]->b.x;
-      Place place;
-      place.scale = between_a.dot(between_b) / between_b.squaredNorm();
-      if (!(place.scale > 0) || !std::isfinite(place.scale)) continue;
-      place.shift = (tracks[i]->a.x + tracks[i + gap]->a.x -
-                     place.scale * (tracks[i]->b.x + tracks[i + gap]->b.x)) /
-                    2;
-      place.cost = Cost(place);
-      if (place.cost < best.cost) best = place;
-    }
-  }
+  ForSomePairs(count, kProposals, [&](int64_t i, int64_t j) {
+    const Vector3d between_a = tracks[i]->a.x - tracks[j]->a.x;
+    const Vector3d between_b = tracks[i]->b.x - tracks[j]->b.x;
+    Place place;
+    place.scale = between_a.dot(between_b) / between_b.squaredNorm();
+    if (!(place.scale > 0) || !std::isfinite(place.scale)) return;
+    place.shift = (tracks[i]->a.x + tracks[j]->a.x -
+                   place.scale * (tracks[i]->b.x + tracks[j]->b.x)) /
+                  2;
+    place.cost = Cost(place);
+    if (place.cost < best.cost) best = place;
+  });
   if (!std::isfinite(best.cost)) return std::nullopt;
   return best;
 }
@@ -370,12 +358,9 @@ std::optional<Place> PlaceSearch::Propose() const {
 std::vector<Place> PlaceSearch::Profile(const std::vector<double>& scales,
                                         const Context& context) const {
   std::vector<Place> places(scales.size());
-  ParallelFor(static_cast<int64_t>(scales.size()), 1, context.num_threads,
-              [&](int64_t begin, int64_t end, int) {
-                for (int64_t n = begin; n < end; ++n) {
-                  places[n] = BestPlace(scales[n]);
-                }
-              });
+  ParallelFor(
+      static_cast<int64_t>(scales.size()), 1, context.num_threads,
+      [&](int64_t n, int64_t, int) { places[n] = BestPlace(scales[n]); });
   std::stable_sort(
       places.begin(), places.end(),
       [](const Place& x, const Place& y) { return x.cost < y.cost; });

@@ -15,9 +15,25 @@
 
 namespace krot::internal {
 
-// The frame of observation i.
-inline int32_t FrameOf(const KnownRotationProblem& problem, int64_t i) {
-  return problem.views[problem.observations[i].view].frame;
+// Leaves each value once, ascending.
+template <typename Value>
+void SortUnique(std::vector<Value>* values) {
+  std::sort(values->begin(), values->end());
+  values->erase(std::unique(values->begin(), values->end()), values->end());
+}
+
+// Calls body(a, b) for about `num_tried` of the pairs a < b of [0, count),
+// spread evenly, those that are farthest apart first.
+template <typename Body>
+void ForSomePairs(int64_t count, int64_t num_tried, const Body& body) {
+  const int64_t stride =
+      std::max<int64_t>(1, count * (count - 1) / 2 / num_tried);
+  int64_t pair = 0;
+  for (int64_t gap = count - 1; gap > 0; --gap) {
+    for (int64_t a = 0; a + gap < count; ++a, ++pair) {
+      if (pair % stride == 0) body(a, a + gap);
+    }
+  }
 }
 
 // Two groups of frames that share tracks.
@@ -36,8 +52,8 @@ class Groups {
   // All frames of group g go over to group new_group[g].
   void Merge(const std::vector<int32_t>& new_group);
 
-  // All pairs of groups a < b that share tracks; their strength is the number of
-  // these. O(sum over tracks of their squared numbers of groups).
+  // All pairs of groups a < b that share tracks; their strength is the number
+  // of these. O(sum over tracks of their squared numbers of groups).
   std::vector<GroupPair> Pairs() const;
   // Per group: the tracks that two of its frames see, or its only frame; and of
   // these the tracks that frames of other groups see, too: at least two such
@@ -90,8 +106,6 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
 // The 99.9 % quantile of chi-squared of three degrees of freedom: one right
 // track in a thousand exceeds it.
 inline constexpr double kCutOff = 16.3;
-// Three standard deviations, squared: costs that rise by less are no worse.
-inline constexpr double kNoWorse = 9;
 
 // What one group says about a track: its point there, and the observations that
 // agree with it.
@@ -157,7 +171,8 @@ class PlaceSearch {
           return BestPoint(track, place).second < kCutOff * variance_;
         });
   }
-  double no_worse() const { return kNoWorse * variance_; }
+  // Three standard deviations, squared: costs that rise by less are no worse.
+  double no_worse() const { return 9 * variance_; }
 
  private:
   double SquaredError(int64_t i, const Eigen::Vector3d& x) const {

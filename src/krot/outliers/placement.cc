@@ -1,7 +1,8 @@
-#include "krot/outliers/placement.h"
+#include "krot/outliers/robust_start.h"
 
 #include <algorithm>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/convert/build_problem.h"
+#include "krot/outliers/parts.h"
 #include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 
@@ -18,19 +20,6 @@ namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr int64_t kPlacesPerTask = 64;
-// About so many pairs of rays are tried.
-constexpr int64_t kTriedPairs = 60;
-
-// The direction in the world where v = 0 and w > 0; of unit length.
-Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i) {
-  const Observation& o = problem.observations[i];
-  Vector3d ray = o.E.row(1).cross(o.E.row(2)).transpose();
-  if (o.E.row(0).dot(ray) < 0) ray = -ray;
-  return (problem.views[o.view].cam_from_world_rotation.transpose() * ray)
-      .normalized();
-}
 
 // Finds a place near most rays. error(n, place) is the error of the n-th ray
 // there; none counts for more than the cap.
@@ -44,15 +33,10 @@ class RobustPlace {
   Vector3d Find(double depth) {
     best_ = rays_.front().centre + depth * rays_.front().direction;
     lowest_ = Score(best_);
-    const int64_t count = static_cast<int64_t>(rays_.size());
-    const int64_t num_pairs = count * (count - 1) / 2;
-    const int64_t stride = std::max<int64_t>(1, num_pairs / kTriedPairs);
-    int64_t pair = 0;
-    for (int64_t gap = count - 1; gap > 0; --gap) {
-      for (int64_t a = 0; a + gap < count; ++a, ++pair) {
-        if (pair % stride == 0) Try({rays_[a], rays_[a + gap]});
-      }
-    }
+    const auto count = static_cast<int64_t>(rays_.size());
+    ForSomePairs(count, 60, [&](int64_t a, int64_t b) {
+      Try({rays_[a], rays_[b]});
+    });
     std::vector<Ray> agreeing;
     for (int64_t n = 0; n < count; ++n) {
       if (error_(n, best_) < cap_) agreeing.push_back(rays_[n]);
@@ -99,6 +83,19 @@ double MedianDepthOfOthers(const KnownRotationProblem& problem,
 
 }  // namespace
 
+std::vector<int32_t> AllPoints(const KnownRotationProblem& problem) {
+  std::vector<int32_t> all(problem.num_points);
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i) {
+  const Observation& o = problem.observations[i];
+  const Vector3d ray = o.E.row(1).cross(o.E.row(2)).transpose();
+  return (problem.views[o.view].cam_from_world_rotation.transpose() * ray)
+      .normalized();
+}
+
 void PlacePointsRobustly(const KnownRotationProblem& problem,
                          const std::vector<int32_t>& points, Norm norm,
                          double cap, const Context& context,
@@ -120,7 +117,7 @@ void PlacePointsRobustly(const KnownRotationProblem& problem,
     };
     estimate->points[k] = RobustPlace(rays, cap, error).Find(depth);
   };
-  ParallelFor(static_cast<int64_t>(points.size()), kPlacesPerTask,
+  ParallelFor(static_cast<int64_t>(points.size()), /*chunk_size=*/64,
               context.num_threads, [&](int64_t begin, int64_t end, int) {
                 for (int64_t n = begin; n < end; ++n) place(points[n]);
               });
@@ -136,9 +133,7 @@ void PlaceFramesRobustly(const KnownRotationProblem& problem,
   const auto place = [&](int32_t f) {
     std::vector<Ray> rays;
     std::vector<int64_t> seen;
-    for (int64_t m = problem.frame_begin[f]; m < problem.frame_begin[f + 1];
-         ++m) {
-      const int64_t i = problem.frame_observations[m];
+    for (const int32_t i : problem.OfFrame(f)) {
       const Observation& o = problem.observations[i];
       if (!is_placed[o.point]) continue;
       const View& view = problem.views[o.view];
@@ -159,10 +154,9 @@ void PlaceFramesRobustly(const KnownRotationProblem& problem,
     estimate->translations[f] =
         -rig_from_world[f] * RobustPlace(rays, cap, error).Find(1);
   };
-  ParallelFor(static_cast<int64_t>(frames.size()), kPlacesPerTask,
-              context.num_threads, [&](int64_t begin, int64_t end, int) {
-                for (int64_t n = begin; n < end; ++n) place(frames[n]);
-              });
+  ParallelFor(static_cast<int64_t>(frames.size()), /*chunk_size=*/1,
+              context.num_threads,
+              [&](int64_t n, int64_t, int) { place(frames[n]); });
 }
 
 }  // namespace krot::internal

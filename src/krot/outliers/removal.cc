@@ -17,21 +17,13 @@
 #include "krot/sweeps/res_int.h"
 
 namespace krot::internal {
-namespace {
-
-constexpr int64_t kTiesPerPoint = 6;
-constexpr int64_t kTiesPerFrame = 20;
-
-}  // namespace
-
 NearSet::NearSet(const KnownRotationProblem& problem)
     : problem_(&problem), contains_(problem.observations.size(), 0) {}
 
 void NearSet::AddAbove(const std::vector<double>& errors, double level) {
   for (int32_t k = 0; k < problem_->num_points; ++k) {
     bool is_near = false;
-    for (int64_t i = problem_->point_begin[k]; i < problem_->point_begin[k + 1];
-         ++i) {
+    for (const int64_t i : problem_->OfPoint(k)) {
       if (!(errors[i] <= level)) contains_[i] = 1;
       is_near = is_near || Contains(i);
     }
@@ -40,14 +32,13 @@ void NearSet::AddAbove(const std::vector<double>& errors, double level) {
   TieFrames();
 }
 
-// Adds observations of a point, evenly along its track, up to kTiesPerPoint.
+// Adds observations of a point, evenly along its track, up to six.
 void NearSet::TiePoint(int32_t point) {
   const int64_t begin = problem_->point_begin[point];
   const int64_t end = problem_->point_begin[point + 1];
   const int64_t others =
       std::count(&contains_[0] + begin, &contains_[0] + end, 0);
-  const int64_t missing =
-      std::min(others, kTiesPerPoint - (end - begin - others));
+  const int64_t missing = std::min(others, 6 - (end - begin - others));
   int64_t n = 0;
   for (int64_t i = begin; i < end && missing > 0; ++i) {
     if (Contains(i)) continue;
@@ -59,10 +50,8 @@ void NearSet::TiePoint(int32_t point) {
 void NearSet::TieFrames() {
   for (int32_t f = 0; f < problem_->num_frames; ++f) {
     std::vector<int64_t> others;
-    int64_t missing = kTiesPerFrame;
-    for (int64_t n = problem_->frame_begin[f]; n < problem_->frame_begin[f + 1];
-         ++n) {
-      const int64_t i = problem_->frame_observations[n];
+    int64_t missing = 20;
+    for (const int32_t i : problem_->OfFrame(f)) {
       if (Contains(i)) {
         --missing;
       } else {
@@ -86,24 +75,8 @@ std::vector<std::vector<int64_t>> NearSet::Parts() const {
 
 namespace {
 
-// The programmes' bound is lower by this share, since the interior point ends
-// slightly above its optimum.
-constexpr double kInside = 1e-3;
-// After so many programmes in a row that remove no fewer, only one more is
-// solved.
-constexpr int kPatience = 3;
-// Observations with errors above this share of the bound are looked at.
-constexpr double kNear = 0.5;
 // It is costly to exceed the bound by less than this share of it.
 constexpr double kDear = 0.03;
-// Relative to the bound: the last mu of most programmes, and of the last one.
-constexpr double kRoughMu = 1e-3;
-constexpr double kFineMu = 1e-5;
-// In units of the bound: larger excesses get the weight of this one.
-constexpr double kLargestExcess = 100;
-// Observations with a lower price (SlackSolution) do not count as tight.
-constexpr double kSmallPrice = 1e-2;
-constexpr int64_t kErrorsPerTask = 4096;
 
 // The observations whose errors are above a bound.
 std::vector<int64_t> Above(const std::vector<double>& errors,
@@ -130,20 +103,15 @@ RemovalSearch::RemovalSearch(const Model& model, const BuiltProblem& built,
 
 std::vector<double> RemovalSearch::Errors(const Estimate& estimate) const {
   std::vector<double> errors(rows_.observations.size());
-  ParallelFor(static_cast<int64_t>(errors.size()), kErrorsPerTask,
-              context_.num_threads, [&](int64_t begin, int64_t end, int) {
-                for (int64_t i = begin; i < end; ++i) {
-                  errors[i] = Error(estimate, i);
-                }
-              });
+  ParallelForEach(static_cast<int64_t>(errors.size()), context_.num_threads,
+                  [&](int64_t i) { errors[i] = Error(estimate, i); });
   return errors;
 }
 
 std::vector<double> RemovalSearch::WeightsOfErrors() const {
   std::vector<double> excess;
   for (const double error : errors_) {
-    excess.push_back(
-        std::clamp(error - max_error_, 0.0, kLargestExcess * max_error_));
+    excess.push_back(std::clamp(error - max_error_, 0.0, 100 * max_error_));
   }
   return WeightsAgainst(excess, max_error_, kDear);
 }
@@ -158,14 +126,15 @@ void RemovalSearch::Excess(const std::vector<int64_t>& part,
   options.smallest_mu = smallest_mu;
   for (const int64_t i : part) options.weights.push_back(weights_[i]);
   Estimate own = subset.Restrict(estimate_);
-  const double level = (1 - kInside) * max_error_;
+  // The interior point ends slightly above its optimum.
+  const double level = (1 - 1e-3) * max_error_;
   const SlackSolution solution =
       MinimizeSlack(subset.problem(), level, options, context_, &own);
   subset.Replace(own, &estimate_);
   const std::vector<double> weights =
       WeightsAgainst(solution.slack, level, kDear);
   for (size_t n = 0; n < part.size(); ++n) {
-    if (solution.price[n] > kSmallPrice) is_tight_[part[n]] = 1;
+    if (solution.price[n] > 1e-2) is_tight_[part[n]] = 1;
     weights_[part[n]] = weights[n];
   }
 }
@@ -175,7 +144,7 @@ void RemovalSearch::Excess(const std::vector<int64_t>& part,
 // errors.
 void RemovalSearch::SolveProgramme(double smallest_mu) {
   reprojection_.TakeRows(estimate_, context_.num_threads, &rows_);
-  near_.AddAbove(errors_, kNear * max_error_);
+  near_.AddAbove(errors_, max_error_ / 2);
   for (const std::vector<int64_t>& part : near_.Parts()) {
     Excess(part, smallest_mu);
   }
@@ -204,7 +173,7 @@ bool RemovalSearch::TakeBack(Removal* best) {
   for (int32_t k = 0; k < rows_.num_points; ++k) {
     int64_t nearest = -1;
     double error = 0;
-    for (int64_t i = rows_.point_begin[k]; i < rows_.point_begin[k + 1]; ++i) {
+    for (const int64_t i : rows_.OfPoint(k)) {
       if (!is_removed[i]) continue;
       const double own = Error(best->estimate, i);
       if (!std::isfinite(own) || (nearest >= 0 && own >= error)) continue;
@@ -213,7 +182,7 @@ bool RemovalSearch::TakeBack(Removal* best) {
     }
     if (nearest < 0) continue;
     asked.push_back(nearest);
-    for (int64_t i = rows_.point_begin[k]; i < rows_.point_begin[k + 1]; ++i) {
+    for (const int64_t i : rows_.OfPoint(k)) {
       if (!is_removed[i] || i == nearest) observations.push_back(i);
     }
   }
@@ -229,7 +198,7 @@ bool RemovalSearch::TakeBack(Removal* best) {
   for (const int64_t i : asked) {
     const int32_t k = rows_.observations[i].point;
     bool fits = true;
-    for (int64_t j = rows_.point_begin[k]; j < rows_.point_begin[k + 1]; ++j) {
+    for (const int64_t j : rows_.OfPoint(k)) {
       if (is_removed[j] && j != i) continue;
       fits = fits && Error(moved, j) <= max_error_;
     }
@@ -256,10 +225,11 @@ Removal RemovalSearch::Find(double max_error, int max_programmes) {
   int num_idle = 0;
   for (int n = 0; n < max_programmes && !context_.IsCancelled(); ++n) {
     if (best.observations.empty()) break;
-    const bool is_last = num_idle == kPatience || n + 1 == max_programmes;
+    // After three that remove no fewer, only one more is solved.
+    const bool is_last = num_idle == 3 || n + 1 == max_programmes;
     context_.Stage("choosing what to remove, programme", n + 1, max_programmes);
     if (n == 1) near_ = NearSet(built_.problem);  // the start's says little
-    SolveProgramme(is_last ? kFineMu : kRoughMu);
+    SolveProgramme(/*smallest_mu=*/is_last ? 1e-5 : 1e-3);
     const size_t before = best.observations.size();
     Offer(&best);
     if (is_last) break;
@@ -282,17 +252,22 @@ Removal FindRemoval(const Model& model, const BuiltProblem& built,
       .Find(bound.max_error, max_programmes);
 }
 
-OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
-                            const std::vector<int64_t>& removed,
-                            const Estimate& start, Norm norm,
-                            double relative_gap, const Context& context) {
-  std::vector<int64_t> all(built.pixels.size());
+std::vector<int64_t> AllBut(const std::vector<int64_t>& removed, size_t count) {
+  std::vector<int64_t> all(count);
   std::iota(all.begin(), all.end(), 0);
   std::vector<int64_t> kept;
   std::set_difference(all.begin(), all.end(), removed.begin(), removed.end(),
                       std::back_inserter(kept));
-  const ProblemSubset subset(built.problem,
-                             PruneUnconstrained(built.problem, kept));
+  return kept;
+}
+
+OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
+                            const std::vector<int64_t>& removed,
+                            const Estimate& start, Norm norm,
+                            const Context& context) {
+  const ProblemSubset subset(
+      built.problem,
+      PruneUnconstrained(built.problem, AllBut(removed, built.pixels.size())));
   OptimumWithout optimum;
   optimum.estimate = start;
   BuiltProblem part = BuiltPart(built, subset, start);
@@ -302,7 +277,7 @@ OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
   reprojection.TakeRows(estimate, context.num_threads, &part.problem);
   SolveModelOptions options;
   options.norm = norm;
-  options.joint.relative_gap = relative_gap;
+  options.joint.relative_gap = 1e-3;
   SolveSummary summary;
   optimum.proof = SolveInRounds(model, options, SolveMethod::kJoint, context,
                                 Timer(), &part, &estimate, &summary);

@@ -100,7 +100,10 @@ Removal FindRemoval(const Model& model, const BuiltProblem& built,
                     const ErrorBound& bound, const Context& context,
                     int max_programmes = kMaxProgrammes);
 
-// The lowest largest error of some observations, proved.
+// The indices below `count` that are not `removed` (ascending).
+std::vector<int64_t> AllBut(const std::vector<int64_t>& removed, size_t count);
+
+// The lowest largest error of some observations, proved to a thousandth.
 struct OptimumWithout {
   Estimate estimate;     // of the whole problem
   double max_error = 0;  // there, true pixels
@@ -116,6 +119,6 @@ struct OptimumWithout {
 OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
                             const std::vector<int64_t>& removed,
                             const Estimate& start, Norm norm,
-                            double relative_gap, const Context& context);
+                            const Context& context);
 
 }  // namespace krot::internal

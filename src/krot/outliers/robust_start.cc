@@ -13,7 +13,6 @@
 #include "krot/finish/least_squares.h"
 #include "krot/linear/reduced_camera_system.h"
 #include "krot/outliers/parts.h"
-#include "krot/outliers/placement.h"
 #include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
@@ -22,18 +21,6 @@
 namespace krot::internal {
 namespace {
 
-// The redundancy that tracks must give each frame, doubled until the tracks are
-// connected. A track of n observations has 2 n - 3, 2 - 3 / n for each of them.
-constexpr double kRedundancyPerFrame = 120;
-// A group that shares less of its tracks with others is a part with a programme
-// of its own.
-constexpr double kStrongShare = 0.2;
-// Programmes after the first, with weights.
-constexpr int kStartReweightings = 1;
-// A start needs no smaller mu; relative to the level.
-constexpr double kStartMu = 1e-3;
-// The `dear` of WeightsAgainst.
-constexpr double kDearExcess = 0.1;
 // The size of a core. The dense factor of so many costs next to nothing.
 constexpr int32_t kCoreFrames = 500;
 
@@ -52,15 +39,13 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
   std::vector<int64_t> covering;
   for (const int32_t k : longest_first) {
     bool is_needed = false;
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
+    for (const int64_t i : problem.OfPoint(k)) {
       is_needed =
-          is_needed || redundancy[FrameOf(problem, i)] < redundancy_per_frame;
+          is_needed || redundancy[problem.FrameOf(i)] < redundancy_per_frame;
     }
     if (!is_needed) continue;
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
-      redundancy[FrameOf(problem, i)] += 2 - 3 / static_cast<double>(length(k));
+    for (const int64_t i : problem.OfPoint(k)) {
+      redundancy[problem.FrameOf(i)] += 2 - 3 / static_cast<double>(length(k));
       covering.push_back(i);
     }
   }
@@ -68,9 +53,10 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
   return covering;
 }
 
-// The same with as much redundancy as it takes to connect all tracks.
+// The same with as much redundancy as it takes to connect all tracks, 120 for
+// each frame at least. A track of n observations has 2 n - 3.
 std::vector<int64_t> ConnectedTracks(const KnownRotationProblem& problem) {
-  for (double per_frame = kRedundancyPerFrame;; per_frame *= 2) {
+  for (double per_frame = 120;; per_frame *= 2) {
     std::vector<int64_t> tracks = CoveringTracks(problem, per_frame);
     if (tracks.size() == problem.observations.size() ||
         SplitIntoComponents(problem, tracks).size() == 1) {
@@ -95,13 +81,12 @@ Estimate StartByProgramme(const KnownRotationProblem& problem,
   Estimate own = part.Restrict(estimate);
   SlackOptions options;
   options.norm = norm;
-  options.smallest_mu = kStartMu;
-  for (int n = 0; n <= kStartReweightings && !context.IsCancelled(); ++n) {
-    context.Stage("positions from rotations and tracks, programme", n + 1,
-                  kStartReweightings + 1);
+  options.smallest_mu = 1e-3;  // a start needs no smaller
+  for (int n = 1; n <= 2 && !context.IsCancelled(); ++n) {
+    context.Stage("positions from rotations and tracks, programme", n, 2);
     const SlackSolution solution =
         MinimizeSlack(part.problem(), level, options, context, &own);
-    options.weights = WeightsAgainst(solution.slack, level, kDearExcess);
+    options.weights = WeightsAgainst(solution.slack, level, /*dear=*/0.1);
   }
   part.Replace(own, &estimate);
   std::vector<char> is_placed(problem.num_points, 0);
@@ -182,14 +167,11 @@ class GrownStart {
       const int64_t f = most(n == 0 ? num_seen : num_shared);
       is_frame_[f] = 1;
       num_shared[f] = -1;
-      for (int64_t m = problem_.frame_begin[f]; m < problem_.frame_begin[f + 1];
-           ++m) {
-        const int32_t k =
-            problem_.observations[problem_.frame_observations[m]].point;
+      for (const int32_t i : problem_.OfFrame(f)) {
+        const int32_t k = problem_.observations[i].point;
         if (std::exchange(is_seen[k], 1)) continue;
-        for (int64_t i = problem_.point_begin[k];
-             i < problem_.point_begin[k + 1]; ++i) {
-          const int32_t other = FrameOf(problem_, i);
+        for (const int64_t j : problem_.OfPoint(k)) {
+          const int32_t other = problem_.FrameOf(j);
           if (!is_frame_[other]) ++num_shared[other];
         }
       }
@@ -202,9 +184,8 @@ class GrownStart {
     std::vector<int64_t> seen;
     for (int32_t k = 0; k < problem_.num_points; ++k) {
       const size_t before = seen.size();
-      for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-           ++i) {
-        if (is_frame_[FrameOf(problem_, i)]) seen.push_back(i);
+      for (const int64_t i : problem_.OfPoint(k)) {
+        if (is_frame_[problem_.FrameOf(i)]) seen.push_back(i);
       }
       if (seen.size() < before + 2) seen.resize(before);
     }
@@ -225,11 +206,8 @@ class GrownStart {
     for (int32_t f = 0; f < problem_.num_frames; ++f) {
       if (is_frame_[f]) continue;
       num_seen[f] = 0;
-      for (int64_t m = problem_.frame_begin[f]; m < problem_.frame_begin[f + 1];
-           ++m) {
-        num_seen[f] +=
-            is_point_[problem_.observations[problem_.frame_observations[m]]
-                          .point];
+      for (const int32_t i : problem_.OfFrame(f)) {
+        num_seen[f] += is_point_[problem_.observations[i].point];
       }
     }
     const int64_t most = *std::max_element(num_seen.begin(), num_seen.end());
@@ -278,13 +256,11 @@ std::vector<std::vector<int64_t>> SplitIntoParts(
   std::vector<std::vector<int64_t>> split(
       *std::max_element(part_of.begin(), part_of.end()) + 1);
   for (int32_t k = 0; k < problem.num_points; ++k) {
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
-      const int32_t own = part_of[FrameOf(problem, i)];
+    for (const int64_t i : problem.OfPoint(k)) {
+      const int32_t own = part_of[problem.FrameOf(i)];
       int num_own = 0;
-      for (int64_t j = problem.point_begin[k]; j < problem.point_begin[k + 1];
-           ++j) {
-        num_own += part_of[FrameOf(problem, j)] == own;
+      for (const int64_t j : problem.OfPoint(k)) {
+        num_own += part_of[problem.FrameOf(j)] == own;
       }
       if (num_own >= 2) split[own].push_back(i);
     }
@@ -318,9 +294,8 @@ Estimate StartOfParts(const KnownRotationProblem& problem,
             &estimate);
   std::vector<int32_t> across;
   for (int32_t k = 0; k < problem.num_points; ++k) {
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
-      if (part_of[FrameOf(problem, i)] == point_part[k]) continue;
+    for (const int64_t i : problem.OfPoint(k)) {
+      if (part_of[problem.FrameOf(i)] == point_part[k]) continue;
       across.push_back(k);
       break;
     }
@@ -336,7 +311,7 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
   PartOptions options;
   options.min_tracks = 1;
   options.compares_scales = false;
-  options.min_share = kStrongShare;
+  options.min_share = 0.2;
   const std::vector<int32_t> part_of = FindParts(problem, options);
   if (*std::max_element(part_of.begin(), part_of.end()) == 0) {
     return StartOfPart(problem, norm, level, context);

@@ -12,6 +12,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/convert/reprojection.h"
 #include "krot/minimax/residual_set.h"
+#include "krot/outliers/parts.h"
 #include "krot/outliers/removal.h"
 
 namespace krot::internal {
@@ -21,14 +22,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
-
-constexpr int64_t kFewestConflicts = 3;
-constexpr double kMost = 0.5;  // of all conflicts
-constexpr double kGapOfSuspect = 1e-3;
-constexpr size_t kFewestSightings = 6;
-constexpr int kTurnIterations = 50;
-constexpr double kSmallestTurn = 1e-12;  // rad
-constexpr double kTurnDamping = 1e-9;    // relative
 
 // An observation of the image, and its point in the camera as that stands now.
 struct Sighting {
@@ -49,77 +42,72 @@ class TurnFit {
       : source_(source), bound_(bound), sightings_(std::move(sightings)) {}
 
   // Fits the translation and, if asked to, the rotation.
-  Turn Fit(bool with_rotation) const;
-  int64_t NumAbove(const Turn& turn) const;
+  Turn Fit(bool with_rotation) const {
+    Turn turn;
+    for (int n = 0; n < 50; ++n) {
+      const Vector6d step = Step(turn, with_rotation);
+      if (!step.allFinite()) break;
+      const Vector3d omega = step.head<3>();
+      const double angle = omega.norm();
+      if (angle > 0) {
+        turn.rotation =
+            Eigen::AngleAxisd(angle, omega / angle).toRotationMatrix() *
+            turn.rotation;
+      }
+      turn.translation += step.tail<3>();
+      if (with_rotation && angle < 1e-12) break;
+    }
+    return turn;
+  }
+
+  int64_t NumAbove(const Turn& turn) const {
+    return std::count_if(
+        sightings_.begin(), sightings_.end(), [&](const Sighting& sighting) {
+          const std::optional<Vector2d> e = ProjectionError(
+              source_.model_id, source_.params, sighting.pixel,
+              turn.rotation * sighting.x_cam + turn.translation);
+          return !e || !(NormOf(*e, bound_.norm) <= bound_.max_error);
+        });
+  }
 
  private:
-  Vector6d Step(const Turn& turn, bool with_rotation) const;
+  // A Gauss-Newton step, with rows taken at the projection: e = v / w.
+  Vector6d Step(const Turn& turn, bool with_rotation) const {
+    Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+    Vector6d gradient = Vector6d::Zero();
+    for (const Sighting& sighting : sightings_) {
+      const Vector3d turned = turn.rotation * sighting.x_cam;
+      const Vector3d x = turned + turn.translation;
+      const std::optional<Matrix3d> row =
+          RowAtProjection(source_.model_id, source_.params, sighting.pixel, x);
+      if (!row) continue;
+      const Vector3d wv = *row * x;
+      const Vector2d e = wv.tail<2>() / wv[0];
+      const Eigen::Matrix<double, 2, 3> by_x =
+          (row->bottomRows<2>() - e * row->row(0)) / wv[0];
+      Eigen::Matrix<double, 2, 6> J;
+      J.rightCols<3>() = by_x;
+      J.leftCols<3>().setZero();
+      if (with_rotation) {
+        for (int k = 0; k < 3; ++k) {
+          J.col(k) = by_x * Vector3d::Unit(k).cross(turned);
+        }
+      }
+      const double weight =
+          1 / (1 + e.squaredNorm() / (bound_.max_error * bound_.max_error));
+      normal += weight * J.transpose() * J;
+      gradient += weight * J.transpose() * e;
+    }
+    for (int k = 0; k < 6; ++k) {
+      normal(k, k) = normal(k, k) > 0 ? normal(k, k) * (1 + 1e-9) : 1;
+    }
+    return -normal.ldlt().solve(gradient);
+  }
 
   const Reprojection::Source source_;
   const ErrorBound bound_;
   const std::vector<Sighting> sightings_;
 };
-
-// A Gauss-Newton step, with rows taken at the projection: e = v / w.
-Vector6d TurnFit::Step(const Turn& turn, bool with_rotation) const {
-  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-  Vector6d gradient = Vector6d::Zero();
-  for (const Sighting& sighting : sightings_) {
-    const Vector3d turned = turn.rotation * sighting.x_cam;
-    const Vector3d x = turned + turn.translation;
-    const std::optional<Matrix3d> row =
-        RowAtProjection(source_.model_id, source_.params, sighting.pixel, x);
-    if (!row) continue;
-    const Vector3d wv = *row * x;
-    const Vector2d e = wv.tail<2>() / wv[0];
-    const Eigen::Matrix<double, 2, 3> by_x =
-        (row->bottomRows<2>() - e * row->row(0)) / wv[0];
-    Eigen::Matrix<double, 2, 6> J;
-    J.rightCols<3>() = by_x;
-    J.leftCols<3>().setZero();
-    if (with_rotation) {
-      for (int k = 0; k < 3; ++k) {
-        J.col(k) = by_x * Vector3d::Unit(k).cross(turned);
-      }
-    }
-    const double weight =
-        1 / (1 + e.squaredNorm() / (bound_.max_error * bound_.max_error));
-    normal += weight * J.transpose() * J;
-    gradient += weight * J.transpose() * e;
-  }
-  for (int k = 0; k < 6; ++k) {
-    normal(k, k) = normal(k, k) > 0 ? normal(k, k) * (1 + kTurnDamping) : 1;
-  }
-  return -normal.ldlt().solve(gradient);
-}
-
-Turn TurnFit::Fit(bool with_rotation) const {
-  Turn turn;
-  for (int n = 0; n < kTurnIterations; ++n) {
-    const Vector6d step = Step(turn, with_rotation);
-    if (!step.allFinite()) break;
-    const Vector3d omega = step.head<3>();
-    const double angle = omega.norm();
-    if (angle > 0) {
-      turn.rotation =
-          Eigen::AngleAxisd(angle, omega / angle).toRotationMatrix() *
-          turn.rotation;
-    }
-    turn.translation += step.tail<3>();
-    if (with_rotation && angle < kSmallestTurn) break;
-  }
-  return turn;
-}
-
-int64_t TurnFit::NumAbove(const Turn& turn) const {
-  return std::count_if(
-      sightings_.begin(), sightings_.end(), [&](const Sighting& sighting) {
-        const std::optional<Vector2d> e =
-            ProjectionError(source_.model_id, source_.params, sighting.pixel,
-                            turn.rotation * sighting.x_cam + turn.translation);
-        return !e || !(NormOf(*e, bound_.norm) <= bound_.max_error);
-      });
-}
 
 // For each view the number of conflicts that it has observations in.
 std::vector<int64_t> ConflictsOfViews(const KnownRotationProblem& problem,
@@ -130,8 +118,7 @@ std::vector<int64_t> ConflictsOfViews(const KnownRotationProblem& problem,
     for (const int64_t i : conflict.observations) {
       views.push_back(problem.observations[i].view);
     }
-    std::sort(views.begin(), views.end());
-    views.erase(std::unique(views.begin(), views.end()), views.end());
+    SortUnique(&views);
     for (const int32_t v : views) ++counts[v];
   }
   return counts;
@@ -149,9 +136,8 @@ std::optional<int32_t> SuspectedView(const KnownRotationProblem& problem,
   }
   std::optional<int32_t> suspected;
   for (size_t v = 0; v < counts.size(); ++v) {
-    const bool is_in_most = counts[v] >= kFewestConflicts &&
-                            static_cast<double>(counts[v]) >=
-                                kMost * static_cast<double>(num_conflicts);
+    const bool is_in_most =
+        counts[v] >= 3 && 2 * counts[v] >= static_cast<int64_t>(num_conflicts);
     if (!is_in_most) continue;
     if (!suspected || num_removed[v] > num_removed[*suspected]) {
       suspected = static_cast<int32_t>(v);
@@ -181,8 +167,7 @@ std::vector<Sighting> SightingsOf(const BuiltProblem& built,
   for (const int64_t i : observations) {
     const int32_t k = problem.observations[i].point;
     int64_t num_others = 0;
-    for (int64_t j = problem.point_begin[k]; j < problem.point_begin[k + 1];
-         ++j) {
+    for (const int64_t j : problem.OfPoint(k)) {
       num_others +=
           problem.observations[j].view != problem.observations[i].view;
     }
@@ -212,8 +197,7 @@ std::optional<RotationSuspect> FindRotationSuspect(
   const Context within = context.Within("asking whether a rotation is wrong");
   const auto solve = [&](const std::vector<int64_t>& removed,
                          const Estimate& start) {
-    return SolveWithout(model, built, removed, start, bound.norm, kGapOfSuspect,
-                        within);
+    return SolveWithout(model, built, removed, start, bound.norm, within);
   };
   const OptimumWithout with = solve({}, built.start);
   const OptimumWithout without = solve(observations, built.start);
@@ -222,7 +206,7 @@ std::optional<RotationSuspect> FindRotationSuspect(
   const Reprojection reprojection(model, built);
   std::vector<Sighting> sightings =
       SightingsOf(built, reprojection, observations, placed.estimate);
-  if (context.IsCancelled() || sightings.size() < kFewestSightings) {
+  if (context.IsCancelled() || sightings.size() < 6) {
     return std::nullopt;
   }
   RotationSuspect suspect;

@@ -1,4 +1,4 @@
-#include "krot/outliers/filter_steps.h"
+#include "krot/outliers/outlier_filter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,26 +23,16 @@ namespace {
 
 // Removes observations round by round; kept_ is what is still left of the
 // input.
-class SnoopingFilter {
+class SnoopingFilter : private Filtering {
  public:
   SnoopingFilter(const Model& model, const OutlierFilterOptions& options,
                  const Context& context)
-      : model_(model),
-        options_(options),
-        context_(context),
-        errors_before_(PixelErrors(model, context.num_threads)),
-        is_removed_(model.track_elements.size(), 0),
-        w_(model.track_elements.size(), 0),
-        conflict_of_(model.track_elements.size(), -1),
-        kept_(RemoveObservations(model, is_removed_)) {}
+      : Filtering(model, options, context) {
+    w_.assign(model.track_elements.size(), 0);
+    kept_ = RemoveObservations(model, is_removed_);
+  }
 
   OutlierFilterResult Run() {
-    summary_.method = options_.method;
-    summary_.norm = options_.solve.norm;
-    summary_.num_observations =
-        static_cast<int64_t>(model_.track_elements.size());
-    summary_.num_points = static_cast<int64_t>(model_.points3D.size());
-    summary_.pixel_error_before = Summarize(errors_before_);
     summary_.snooping.emplace();
     while (Remove()) {
       MoveToLeastSquares();
@@ -50,6 +40,12 @@ class SnoopingFilter {
     }
     if (options_.find_conflicts && summary_.snooping->sigma_px) Prove();
     if (context_.IsCancelled()) return {model_, std::move(summary_)};
+    std::vector<double> before;
+    for (const uint64_t e : kept_.element_of) {
+      before.push_back(errors_before_[e]);
+    }
+    summary_.snooping->kept_error_before = Summarize(before);
+    summary_.is_within = true;
     Describe();
     return {std::move(kept_.model), std::move(summary_)};
   }
@@ -83,11 +79,7 @@ class SnoopingFilter {
     for (size_t k = 0; k < kept_.model.points3D.size(); ++k) {
       kept_.model.points3D[k].xyz = found.noise.points[k];
     }
-    RemovedObservations rest = RemoveObservations(kept_.model, is_gone);
-    for (uint64_t& e : rest.element_of) e = kept_.element_of[e];
-    rest.num_left_alone += kept_.num_left_alone;
-    rest.num_points += kept_.num_points;
-    kept_ = std::move(rest);
+    RemoveMore(is_gone);
     summary_.seconds_removal += timer.Seconds();
     context_.Note(
         "round " + std::to_string(summary.num_rounds) + ": " +
@@ -132,17 +124,7 @@ class SnoopingFilter {
     ConflictPacking packing =
         PackAgainstRemoval(model_, built, bound, removal, {}, context_);
     summary_.is_search_complete = packing.is_complete;
-    std::vector<PixelCertificate> proofs;
-    for (Conflict& conflict : packing.conflicts) {
-      for (const int64_t i : conflict.observations) {
-        conflict_of_[elements[i]] = summary_.num_proved;
-      }
-      ++summary_.num_proved;
-      summary_.num_irreducible += conflict.is_irreducible;
-      proofs.push_back(std::move(conflict.proof));
-    }
-    summary_.conflicts =
-        DescribeConflicts(model_, built, bound.norm, bound.max_error, proofs);
+    TakeConflicts(built, elements, bound, std::move(packing.conflicts));
     summary_.seconds_conflicts = timer.Seconds();
   }
 
@@ -172,8 +154,7 @@ class SnoopingFilter {
     for (int32_t k = 0; k < problem.num_points; ++k) {
       std::vector<Eigen::Matrix<double, 2, 3>> rows;
       Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-      for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-           ++i) {
+      for (const int64_t i : problem.OfPoint(k)) {
         const Observation& o = problem.observations[i];
         const View& view = problem.views[o.view];
         const AffineMap map =
@@ -201,33 +182,7 @@ class SnoopingFilter {
     return scales;
   }
 
-  void Describe() {
-    const std::vector<double> errors =
-        PixelErrors(kept_.model, context_.num_threads);
-    summary_.pixel_error_after = Summarize(errors);
-    std::vector<double> before;
-    for (const uint64_t e : kept_.element_of) {
-      before.push_back(errors_before_[e]);
-    }
-    summary_.snooping->kept_error_before = Summarize(before);
-    summary_.is_within = true;
-    summary_.num_left_alone = kept_.num_left_alone;
-    summary_.num_points_removed = kept_.num_points;
-    summary_.removed = ListRemoved(model_, kept_.model, errors_before_,
-                                   is_removed_, conflict_of_, context_, w_);
-    RankSuspects(model_, is_removed_, conflict_of_, &summary_);
-  }
-
-  const Model& model_;
-  const OutlierFilterOptions& options_;
-  const Context& context_;
-  const std::vector<double> errors_before_;  // per track element
-  std::vector<char> is_removed_;
-  std::vector<double> w_;             // of what is removed
-  std::vector<int64_t> conflict_of_;  // -1: none
-  RemovedObservations kept_;
   ModelNoise noise_;  // of what is kept
-  OutlierFilterSummary summary_;
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "krot/outliers/filter_steps.h"
+#include "krot/outliers/outlier_filter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -46,8 +46,8 @@ class Counts {
   std::map<uint64_t, std::set<int64_t>> conflicts_;
 };
 
-}  // namespace
-
+// Fills in the tracks, images and cameras of a summary: which ones have removed
+// observations, and how many.
 void RankSuspects(const Model& model, const std::vector<char>& is_removed,
                   const std::vector<int64_t>& conflict_of,
                   OutlierFilterSummary* summary) {
@@ -72,29 +72,6 @@ void RankSuspects(const Model& model, const std::vector<char>& is_removed,
   }
 }
 
-void ColorSuspects(const OutlierFilterSummary& summary, Model* model) {
-  std::unordered_set<Point3DId> removed, in_conflict;
-  for (const RemovedObservation& o : summary.removed) {
-    removed.insert(o.point3D_id);
-  }
-  if (summary.conflicts) {
-    for (const ConflictFile::Conflict& conflict :
-         summary.conflicts->conflicts) {
-      for (const CertificateFile::SupportObservation& o :
-           conflict.observations) {
-        in_conflict.insert(o.point3D_id);
-      }
-    }
-  }
-  for (Point3D& point : model->points3D) {
-    point.color = removed.count(point.id) > 0       ? kRemovedColor
-                  : in_conflict.count(point.id) > 0 ? kConflictColor
-                                                    : kUnsuspectedColor;
-  }
-}
-
-namespace {
-
 // The errors of the input's track elements with the result's cameras and
 // points; NaN where the point was removed.
 std::vector<double> ErrorsAfter(const Model& input, const Model& kept,
@@ -112,8 +89,8 @@ std::vector<double> ErrorsAfter(const Model& input, const Model& kept,
   return PixelErrors(model, context.num_threads);
 }
 
-}  // namespace
-
+// The removed observations of `model`, largest error first, with their errors
+// in `model` and with the cameras and points of `kept`, what is left of it.
 std::vector<RemovedObservation> ListRemoved(
     const Model& model, const Model& kept,
     const std::vector<double>& errors_before,
@@ -140,9 +117,7 @@ std::vector<RemovedObservation> ListRemoved(
     }
   }
   const auto key = [](const RemovedObservation& o) {
-    return std::isnan(o.error_before_px)
-               ? std::numeric_limits<double>::infinity()
-               : o.error_before_px;
+    return std::isnan(o.error_before_px) ? kInfinity : o.error_before_px;
   };
   std::stable_sort(
       list.begin(), list.end(),
@@ -150,6 +125,80 @@ std::vector<RemovedObservation> ListRemoved(
         return key(a) > key(b);
       });
   return list;
+}
+
+}  // namespace
+
+void ColorSuspects(const OutlierFilterSummary& summary, Model* model) {
+  std::unordered_set<Point3DId> removed, in_conflict;
+  for (const RemovedObservation& o : summary.removed) {
+    removed.insert(o.point3D_id);
+  }
+  if (summary.conflicts) {
+    for (const ConflictFile::Conflict& conflict :
+         summary.conflicts->conflicts) {
+      for (const CertificateFile::SupportObservation& o :
+           conflict.observations) {
+        in_conflict.insert(o.point3D_id);
+      }
+    }
+  }
+  for (Point3D& point : model->points3D) {
+    point.color = removed.count(point.id) > 0       ? kRemovedColor
+                  : in_conflict.count(point.id) > 0 ? kConflictColor
+                                                    : kUnsuspectedColor;
+  }
+}
+
+Filtering::Filtering(const Model& model, const OutlierFilterOptions& options,
+                     const Context& context)
+    : model_(model),
+      options_(options),
+      context_(context),
+      errors_before_(PixelErrors(model, context.num_threads)),
+      is_removed_(model.track_elements.size(), 0),
+      conflict_of_(model.track_elements.size(), -1) {
+  summary_.method = options.method;
+  summary_.norm = options.solve.norm;
+  summary_.num_observations = static_cast<int64_t>(model.track_elements.size());
+  summary_.num_points = static_cast<int64_t>(model.points3D.size());
+  summary_.pixel_error_before = Summarize(errors_before_);
+}
+
+void Filtering::RemoveMore(const std::vector<char>& is_gone) {
+  RemovedObservations rest = RemoveObservations(kept_.model, is_gone);
+  for (uint64_t& e : rest.element_of) e = kept_.element_of[e];
+  rest.num_left_alone += kept_.num_left_alone;
+  rest.num_points += kept_.num_points;
+  kept_ = std::move(rest);
+}
+
+void Filtering::TakeConflicts(const BuiltProblem& built,
+                              const std::vector<uint64_t>& elements,
+                              const ErrorBound& bound,
+                              std::vector<Conflict> conflicts) {
+  std::vector<PixelCertificate> proofs;
+  for (Conflict& conflict : conflicts) {
+    for (const int64_t i : conflict.observations) {
+      conflict_of_[elements[i]] = summary_.num_proved;
+    }
+    ++summary_.num_proved;
+    summary_.num_irreducible += conflict.is_irreducible;
+    proofs.push_back(std::move(conflict.proof));
+  }
+  summary_.conflicts =
+      DescribeConflicts(model_, built, bound.norm, bound.max_error, proofs);
+}
+
+std::vector<double> Filtering::Describe() {
+  std::vector<double> errors = PixelErrors(kept_.model, context_.num_threads);
+  summary_.pixel_error_after = Summarize(errors);
+  summary_.num_left_alone = kept_.num_left_alone;
+  summary_.num_points_removed = kept_.num_points;
+  summary_.removed = ListRemoved(model_, kept_.model, errors_before_,
+                                 is_removed_, conflict_of_, context_, w_);
+  RankSuspects(model_, is_removed_, conflict_of_, &summary_);
+  return errors;
 }
 
 }  // namespace krot::internal

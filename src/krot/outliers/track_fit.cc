@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <string>
@@ -17,9 +16,8 @@
 #include "krot/geometry.h"
 #include "krot/model/derived_models.h"
 #include "krot/model/rigs.h"
-#include "krot/outliers/filter_steps.h"
 #include "krot/outliers/match_tracks.h"
-#include "krot/outliers/placement.h"
+#include "krot/outliers/outlier_filter.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/gauge.h"
 
@@ -27,8 +25,6 @@ namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr int64_t kTracksPerTask = 64;
 
 // Removes the worst observation of a track of several, if it is above the bound
 // or behind its camera. Returns whether it did.
@@ -168,8 +164,7 @@ std::vector<Vector3d> RobustPlaces(const Model& model, double max_error_px,
   options.ignore_translations = true;
   const BuiltProblem built = BuildProblem(model, options);
   Estimate estimate = OwnEstimate(model, built);
-  std::vector<int32_t> all(built.problem.num_points);
-  std::iota(all.begin(), all.end(), 0);
+  const std::vector<int32_t> all = AllPoints(built.problem);
   PlacePointsRobustly(built.problem, all, Norm::L2(), max_error_px, context,
                       &estimate);
   std::vector<Vector3d> places;
@@ -183,20 +178,16 @@ std::vector<FittedTrack> FitTracks(const Model& model, double max_error_px,
   std::vector<FittedTrack> fitted(model.points3D.size());
   const std::vector<double> no_weights;
   TrackNoise fit(model, no_weights);
-  ParallelFor(
-      static_cast<int64_t>(fitted.size()), kTracksPerTask, context.num_threads,
-      [&](int64_t begin, int64_t end, int /*worker*/) {
-        for (int64_t n = begin; n < end; ++n) {
-          const Point3D& point = model.points3D[n];
-          for (bool has_changed = true; has_changed;) {
-            fit.Fit(n);
-            has_changed = RemoveWorst(point, max_error_px, &fit);
-          }
-          for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-            if (fit.TakesPart(e)) fitted[n].elements.push_back(e);
-          }
-          fitted[n].xyz = fit.Point(n);
+  ParallelForEach(
+      static_cast<int64_t>(fitted.size()), context.num_threads, [&](int64_t n) {
+        const Point3D& point = model.points3D[n];
+        do {
+          fit.Fit(n);
+        } while (RemoveWorst(point, max_error_px, &fit));
+        for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+          if (fit.TakesPart(e)) fitted[n].elements.push_back(e);
         }
+        fitted[n].xyz = fit.Point(n);
       });
   return fitted;
 }
@@ -229,10 +220,6 @@ int64_t RemoveNarrow(double min_angle_deg, Model* model) {
 }
 
 namespace {
-
-// The first one divides tracks by the robust start's positions, the second one
-// by positions that fit the first one's tracks.
-constexpr int kTriangulations = 2;
 
 // A copy without positions.
 Model RotationsOf(const Model& model) {
@@ -281,13 +268,15 @@ PlacedMatches PlaceInFrame(const Model& poses, const Database& database,
         geometries[i].has_pose && held.count(static_cast<int32_t>(i)) == 0;
   }
   placed.model = PosesAt(tracks, start.built, start.built.start, context);
-  for (int n = 0; n < kTriangulations && !context.IsCancelled(); ++n) {
+  // The first triangulation divides tracks by the robust start's positions, the
+  // second one by positions that fit the first one's tracks.
+  for (const bool is_last : {false, true}) {
+    if (context.IsCancelled()) break;
     MatchTracksResult made =
         TriangulateMatches(placed.model, database, options, quiet);
     placed.summary = made.summary;
     placed.model = std::move(made.model);
-    if (n + 1 == kTriangulations) break;
-    if (placed.model.points3D.empty()) break;
+    if (is_last || placed.model.points3D.empty()) break;
     const BuiltProblem built = BuildProblem(placed.model, {});
     Estimate estimate = built.start;
     MinimizeRobustly(built.problem, context, &estimate);

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include <Eigen/Geometry>
 
 #include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
-#include "krot/outliers/placement.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
@@ -25,8 +23,6 @@ using Eigen::Vector3d;
 // depths, and the ratio of neighbours on the grid.
 constexpr double kLargestScale = 30;
 constexpr double kScaleStep = 1.05;
-constexpr int kFineSteps = 10;      // to each side, within a grid step
-constexpr size_t kMaxTracks = 200;  // about; more are thinned out
 // Observations agree with a point up to so many standard deviations.
 constexpr double kAgreeing = 4;
 
@@ -50,17 +46,15 @@ double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
     const auto rows =
         2.0 * static_cast<double>(problem.point_begin[o.point + 1] -
                                   problem.point_begin[o.point]);
-    if (rows <= 4 || point_group[o.point] != group_of[FrameOf(problem, i)]) {
+    if (rows <= 4 || point_group[o.point] != group_of[problem.FrameOf(i)]) {
       continue;
     }
     errors.push_back(ResidualOf(ViewPoint(problem, o, estimate), Norm::L2()) *
                      std::sqrt(rows / (rows - 3)));
   }
   if (errors.empty()) return kLeastNoisePx;
-  const auto middle =
-      errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  return std::max(kLeastNoisePx, *middle / std::sqrt(2 * std::log(2.0)));
+  return std::max(kLeastNoisePx,
+                  Median(std::move(errors)) / std::sqrt(2 * std::log(2.0)));
 }
 
 // Joins groups of frames until none share tracks.
@@ -77,16 +71,203 @@ class Joiner {
         point_group_(std::move(point_part)),
         estimate_(*estimate) {}
 
-  std::vector<WeakLink> Run();
+  std::vector<WeakLink> Run() {
+    sigma_ = std::max(NoiseOf(problem_, estimate_, group_of_, point_group_),
+                      cap_ / kAgreeing);
+    std::vector<WeakLink> links;
+    for (;;) {
+      std::vector<GroupPair> pairs = Groups(problem_, group_of_).Pairs();
+      if (pairs.empty()) return links;
+      SortStrongestFirst(&pairs);
+      std::vector<char> is_done(problem_.num_frames, 0);
+      for (const GroupPair& pair : pairs) {
+        if (context_.IsCancelled()) return links;
+        if (is_done[pair.a] || is_done[pair.b]) continue;
+        is_done[pair.a] = is_done[pair.b] = 1;
+        context_.Stage(may_move_ ? "joining parts"
+                                 : "measuring how well few tracks hold parts",
+                       static_cast<int64_t>(links.size()) + 1);
+        links.push_back(Join(pair));
+      }
+    }
+  }
 
  private:
-  std::vector<Side> SidesOf(const std::vector<int32_t>& points, int32_t group);
-  std::vector<SharedTrack> TracksOf(const GroupPair& pair, int64_t* num_shared);
-  bool HasBaselineIn(int32_t group) const;
-  WeakLink Join(GroupPair pair);
-  static void FindTurn(const PlaceSearch& tracks, WeakLink* link);
-  void Move(int32_t group, const Place& place);
-  void Unite(const GroupPair& pair, const Place& place);
+  std::vector<Side> SidesOf(const std::vector<int32_t>& points, int32_t group) {
+    std::vector<int64_t> observations;
+    for (const int32_t k : points) {
+      for (const int64_t i : problem_.OfPoint(k)) {
+        if (group_of_[problem_.FrameOf(i)] == group) observations.push_back(i);
+      }
+    }
+    const ProblemSubset part(problem_, observations);
+    const KnownRotationProblem& own = part.problem();
+    Estimate estimate = part.Restrict(estimate_);
+    const double cap = kAgreeing * sigma_;
+    PlacePointsRobustly(own, AllPoints(own), Norm::L2(), cap, context_,
+                        &estimate);
+    const std::vector<AffineMap> cameras =
+        CamerasFromWorld(problem_, estimate_.translations);
+    std::vector<Side> sides(points.size());
+    for (int32_t k = 0; k < own.num_points; ++k) {
+      Side& side = sides[k];
+      side.x = estimate.points[k];
+      for (const int64_t i : own.OfPoint(k)) {
+        const double error = ResidualOf(
+            ViewPoint(own, own.observations[i], estimate), Norm::L2());
+        if (!(error < cap)) continue;
+        side.observations.push_back(part.InWhole(i));
+        side.sum += error * error;
+      }
+      // If only one of several is left, it is not known which one is right.
+      if (side.observations.size() == 1 &&
+          own.point_begin[k + 1] - own.point_begin[k] > 1) {
+        side.observations.clear();
+      }
+      side.H = NormalOf(problem_, cameras, side, side.x).H;
+    }
+    return sides;
+  }
+
+  // The tracks that both groups see and that say something about the scale;
+  // *num_shared is how many both see in all.
+  std::vector<SharedTrack> TracksOf(const GroupPair& pair,
+                                    int64_t* num_shared) {
+    std::vector<int32_t> points;
+    for (int32_t k = 0; k < problem_.num_points; ++k) {
+      bool has_a = false, has_b = false;
+      for (const int64_t i : problem_.OfPoint(k)) {
+        has_a |= group_of_[problem_.FrameOf(i)] == pair.a;
+        has_b |= group_of_[problem_.FrameOf(i)] == pair.b;
+      }
+      if (has_a && has_b) points.push_back(k);
+    }
+    *num_shared = static_cast<int64_t>(points.size());
+    std::vector<Side> a = SidesOf(points, pair.a);
+    std::vector<Side> b = SidesOf(points, pair.b);
+    std::vector<SharedTrack> tracks;
+    for (size_t n = 0; n < points.size(); ++n) {
+      const size_t least =
+          std::min(a[n].observations.size(), b[n].observations.size());
+      const size_t most =
+          std::max(a[n].observations.size(), b[n].observations.size());
+      if (least >= 1 && most >= 2) {
+        tracks.push_back({std::move(a[n]), std::move(b[n])});
+      }
+    }
+    return tracks;
+  }
+
+  bool HasBaselineIn(int32_t group) const {
+    return std::any_of(problem_.views.begin(), problem_.views.end(),
+                       [&](const View& view) {
+                         return group_of_[view.frame] == group &&
+                                !view.cam_from_rig_translation.isZero(0);
+                       });
+  }
+
+  WeakLink Join(GroupPair pair) {
+    const bool a_is_metric = HasBaselineIn(pair.a);
+    if (!a_is_metric && HasBaselineIn(pair.b)) std::swap(pair.a, pair.b);
+    const bool is_scale_free = !HasBaselineIn(pair.b);
+    WeakLink link;
+    const std::vector<SharedTrack> all = TracksOf(pair, &link.num_tracks);
+    link.num_telling = static_cast<int64_t>(all.size());
+    std::vector<SharedTrack> some;
+    const size_t stride = std::max<size_t>(1, all.size() / 200);
+    for (size_t n = 0; n < all.size(); n += stride) some.push_back(all[n]);
+    const PlaceSearch tracks(problem_, estimate_, sigma_, std::move(some));
+    if (may_move_ && is_scale_free) {
+      if (const std::optional<Place> place = tracks.Propose()) {
+        Unite(pair, *place);
+        return link;
+      }
+    }
+    const int num_steps =
+        is_scale_free
+            ? static_cast<int>(std::log(kLargestScale) / std::log(kScaleStep))
+            : 0;
+    std::vector<Place> places =
+        tracks.Profile(ScalesAround(1, kScaleStep, num_steps), context_);
+    if (is_scale_free) {
+      const int num_fine = 10;  // to each side, within a grid step
+      const std::vector<Place> fine = tracks.Profile(
+          ScalesAround(places[0].scale, std::pow(kScaleStep, 1.0 / num_fine),
+                       num_fine),
+          context_);
+      places.insert(places.begin(), fine.begin(), fine.end());
+    }
+    if (!may_move_) {  // the estimate's own, which a search may miss
+      Place own;
+      own.cost = tracks.Cost(own);
+      places.push_back(own);
+    }
+    Place best = places[0];
+    for (const Place& place : places) {
+      if (place.cost < best.cost) best = place;
+    }
+    const PlaceSearch of_all(problem_, estimate_, sigma_, all);
+    link.num_agreeing = of_all.NumAgreeing(best);
+    if (!may_move_) FindTurn(of_all, &link);
+    const double now = may_move_ ? best.scale : 1;
+    for (const Place& place : places) {
+      if (!(place.cost <= best.cost + tracks.no_worse())) continue;
+      const double factor = std::max(place.scale / now, now / place.scale);
+      const bool is_last = factor * kScaleStep > kLargestScale;
+      link.scale_factor =
+          std::max(link.scale_factor, is_last ? kInfinity : factor);
+    }
+    if (!std::isfinite(best.cost)) {  // no track says anything
+      best = Place();
+      link.scale_factor = kInfinity;
+    }
+    std::vector<int32_t> of_a, of_b;
+    for (int32_t f = 0; f < problem_.num_frames; ++f) {
+      if (group_of_[f] == pair.a) of_a.push_back(f);
+      if (group_of_[f] == pair.b) of_b.push_back(f);
+    }
+    link.frames = of_b.size() <= of_a.size() ? of_b : of_a;
+    Unite(pair, best);
+    return link;
+  }
+
+  // Any three tracks agree at some turn. So twice as many must agree.
+  static void FindTurn(const PlaceSearch& tracks, WeakLink* link) {
+    const std::optional<Place> turned = tracks.ProposeTurned();
+    if (!turned) return;
+    const int64_t count = tracks.NumAgreeing(*turned);
+    if (count < 6 || 2 * count <= link->num_telling ||
+        count < link->num_agreeing + 3) {
+      return;
+    }
+    link->num_agreeing_turned = count;
+    link->turn_deg = Eigen::AngleAxisd(turned->rotation).angle() * (180 / kPi);
+  }
+
+  // Moves a group by x -> scale x + shift:
+  // s (R x + R_sr t) = R (s x + shift) + R_sr t'.
+  void Move(int32_t group, const Place& place) {
+    std::vector<char> has_moved(problem_.num_frames, 0);
+    for (const View& view : problem_.views) {
+      if (group_of_[view.frame] != group || has_moved[view.frame]) continue;
+      has_moved[view.frame] = 1;
+      Vector3d& t = estimate_.translations[view.frame];
+      t = place.scale * t - view.cam_from_rig_rotation.transpose() *
+                                (view.cam_from_world_rotation * place.shift);
+    }
+    for (int32_t k = 0; k < problem_.num_points; ++k) {
+      if (point_group_[k] != group) continue;
+      estimate_.points[k] = place.scale * estimate_.points[k] + place.shift;
+    }
+  }
+
+  // The second group becomes part of the first.
+  void Unite(const GroupPair& pair, const Place& place) {
+    if (may_move_) Move(pair.b, place);
+    for (std::vector<int32_t>* groups : {&group_of_, &point_group_}) {
+      std::replace(groups->begin(), groups->end(), pair.b, pair.a);
+    }
+  }
 
   const KnownRotationProblem& problem_;
   const Context& context_;
@@ -97,206 +278,6 @@ class Joiner {
   Estimate& estimate_;
   double sigma_ = 0;  // pixels
 };
-
-bool Joiner::HasBaselineIn(int32_t group) const {
-  return std::any_of(problem_.views.begin(), problem_.views.end(),
-                     [&](const View& view) {
-                       return group_of_[view.frame] == group &&
-                              !view.cam_from_rig_translation.isZero(0);
-                     });
-}
-
-std::vector<Side> Joiner::SidesOf(const std::vector<int32_t>& points,
-                                  int32_t group) {
-  std::vector<int64_t> observations;
-  for (const int32_t k : points) {
-    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-         ++i) {
-      if (group_of_[FrameOf(problem_, i)] == group) observations.push_back(i);
-    }
-  }
-  const ProblemSubset part(problem_, observations);
-  const KnownRotationProblem& own = part.problem();
-  Estimate estimate = part.Restrict(estimate_);
-  std::vector<int32_t> all(own.num_points);
-  std::iota(all.begin(), all.end(), 0);
-  const double cap = kAgreeing * sigma_;
-  PlacePointsRobustly(own, all, Norm::L2(), cap, context_, &estimate);
-  const std::vector<AffineMap> cameras =
-      CamerasFromWorld(problem_, estimate_.translations);
-  std::vector<Side> sides(points.size());
-  for (int32_t k = 0; k < own.num_points; ++k) {
-    Side& side = sides[k];
-    side.x = estimate.points[k];
-    for (int64_t i = own.point_begin[k]; i < own.point_begin[k + 1]; ++i) {
-      const double error =
-          ResidualOf(ViewPoint(own, own.observations[i], estimate), Norm::L2());
-      if (!(error < cap)) continue;
-      side.observations.push_back(part.InWhole(i));
-      side.sum += error * error;
-    }
-    // If only one of several is left, it is not known which one is right.
-    if (side.observations.size() == 1 &&
-        own.point_begin[k + 1] - own.point_begin[k] > 1) {
-      side.observations.clear();
-    }
-    side.H = NormalOf(problem_, cameras, side, side.x).H;
-  }
-  return sides;
-}
-
-// The tracks that both groups see and that say something about the scale;
-// *num_shared is how many both see in all.
-std::vector<SharedTrack> Joiner::TracksOf(const GroupPair& pair,
-                                          int64_t* num_shared) {
-  std::vector<int32_t> points;
-  for (int32_t k = 0; k < problem_.num_points; ++k) {
-    bool has_a = false, has_b = false;
-    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-         ++i) {
-      has_a |= group_of_[FrameOf(problem_, i)] == pair.a;
-      has_b |= group_of_[FrameOf(problem_, i)] == pair.b;
-    }
-    if (has_a && has_b) points.push_back(k);
-  }
-  *num_shared = static_cast<int64_t>(points.size());
-  std::vector<Side> a = SidesOf(points, pair.a);
-  std::vector<Side> b = SidesOf(points, pair.b);
-  std::vector<SharedTrack> tracks;
-  for (size_t n = 0; n < points.size(); ++n) {
-    const size_t least =
-        std::min(a[n].observations.size(), b[n].observations.size());
-    const size_t most =
-        std::max(a[n].observations.size(), b[n].observations.size());
-    if (least >= 1 && most >= 2) {
-      tracks.push_back({std::move(a[n]), std::move(b[n])});
-    }
-  }
-  return tracks;
-}
-
-// Moves a group by x -> scale x + shift:
-// s (R x + R_sr t) = R (s x + shift) + R_sr t'.
-void Joiner::Move(int32_t group, const Place& place) {
-  std::vector<char> has_moved(problem_.num_frames, 0);
-  for (const View& view : problem_.views) {
-    if (group_of_[view.frame] != group || has_moved[view.frame]) continue;
-    has_moved[view.frame] = 1;
-    Vector3d& t = estimate_.translations[view.frame];
-    t = place.scale * t - view.cam_from_rig_rotation.transpose() *
-                              (view.cam_from_world_rotation * place.shift);
-  }
-  for (int32_t k = 0; k < problem_.num_points; ++k) {
-    if (point_group_[k] != group) continue;
-    estimate_.points[k] = place.scale * estimate_.points[k] + place.shift;
-  }
-}
-
-// Any three tracks agree at some turn. So twice as many must agree.
-void Joiner::FindTurn(const PlaceSearch& tracks, WeakLink* link) {
-  constexpr int64_t kTelling = 6;
-  const std::optional<Place> turned = tracks.ProposeTurned();
-  if (!turned) return;
-  const int64_t count = tracks.NumAgreeing(*turned);
-  if (count < kTelling || 2 * count <= link->num_telling ||
-      count < link->num_agreeing + 3) {
-    return;
-  }
-  link->num_agreeing_turned = count;
-  link->turn_deg = Eigen::AngleAxisd(turned->rotation).angle() * (180 / kPi);
-}
-
-WeakLink Joiner::Join(GroupPair pair) {
-  const bool a_is_metric = HasBaselineIn(pair.a);
-  if (!a_is_metric && HasBaselineIn(pair.b)) std::swap(pair.a, pair.b);
-  const bool is_scale_free = !HasBaselineIn(pair.b);
-  WeakLink link;
-  const std::vector<SharedTrack> all = TracksOf(pair, &link.num_tracks);
-  link.num_telling = static_cast<int64_t>(all.size());
-  std::vector<SharedTrack> some;
-  const size_t stride = std::max<size_t>(1, all.size() / kMaxTracks);
-  for (size_t n = 0; n < all.size(); n += stride) some.push_back(all[n]);
-  const PlaceSearch tracks(problem_, estimate_, sigma_, std::move(some));
-  if (may_move_ && is_scale_free) {
-    if (const std::optional<Place> place = tracks.Propose()) {
-      Unite(pair, *place);
-      return link;
-    }
-  }
-  const int num_steps =
-      is_scale_free
-          ? static_cast<int>(std::log(kLargestScale) / std::log(kScaleStep))
-          : 0;
-  std::vector<Place> places =
-      tracks.Profile(ScalesAround(1, kScaleStep, num_steps), context_);
-  if (is_scale_free) {
-    const double step = std::pow(kScaleStep, 1.0 / kFineSteps);
-    const std::vector<Place> fine = tracks.Profile(
-        ScalesAround(places[0].scale, step, kFineSteps), context_);
-    places.insert(places.begin(), fine.begin(), fine.end());
-  }
-  if (!may_move_) {  // the estimate's own, which a search may miss
-    Place own;
-    own.cost = tracks.Cost(own);
-    places.push_back(own);
-  }
-  Place best = places[0];
-  for (const Place& place : places) {
-    if (place.cost < best.cost) best = place;
-  }
-  const PlaceSearch of_all(problem_, estimate_, sigma_, all);
-  link.num_agreeing = of_all.NumAgreeing(best);
-  if (!may_move_) FindTurn(of_all, &link);
-  const double now = may_move_ ? best.scale : 1;
-  for (const Place& place : places) {
-    if (!(place.cost <= best.cost + tracks.no_worse())) continue;
-    const double factor = std::max(place.scale / now, now / place.scale);
-    const bool is_last = factor * kScaleStep > kLargestScale;
-    link.scale_factor =
-        std::max(link.scale_factor, is_last ? kInfinity : factor);
-  }
-  if (!std::isfinite(best.cost)) {  // no track says anything
-    best = Place();
-    link.scale_factor = kInfinity;
-  }
-  std::vector<int32_t> of_a, of_b;
-  for (int32_t f = 0; f < problem_.num_frames; ++f) {
-    if (group_of_[f] == pair.a) of_a.push_back(f);
-    if (group_of_[f] == pair.b) of_b.push_back(f);
-  }
-  link.frames = of_b.size() <= of_a.size() ? of_b : of_a;
-  Unite(pair, best);
-  return link;
-}
-
-// The second group becomes part of the first.
-void Joiner::Unite(const GroupPair& pair, const Place& place) {
-  if (may_move_) Move(pair.b, place);
-  for (std::vector<int32_t>* groups : {&group_of_, &point_group_}) {
-    std::replace(groups->begin(), groups->end(), pair.b, pair.a);
-  }
-}
-
-std::vector<WeakLink> Joiner::Run() {
-  sigma_ = std::max(NoiseOf(problem_, estimate_, group_of_, point_group_),
-                    cap_ / kAgreeing);
-  std::vector<WeakLink> links;
-  for (;;) {
-    std::vector<GroupPair> pairs = Groups(problem_, group_of_).Pairs();
-    if (pairs.empty()) return links;
-    SortStrongestFirst(&pairs);
-    std::vector<char> is_done(problem_.num_frames, 0);
-    for (const GroupPair& pair : pairs) {
-      if (context_.IsCancelled()) return links;
-      if (is_done[pair.a] || is_done[pair.b]) continue;
-      is_done[pair.a] = is_done[pair.b] = 1;
-      context_.Stage(may_move_ ? "joining parts"
-                               : "measuring how well few tracks hold parts",
-                     static_cast<int64_t>(links.size()) + 1);
-      links.push_back(Join(pair));
-    }
-  }
-}
 
 }  // namespace
 
@@ -316,21 +297,18 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
   std::vector<WeakLink> links;
   for (std::vector<int64_t>& component : SplitIntoComponents(problem)) {
     std::vector<int32_t> frames;  // of the component, as the subset has them
-    for (const int64_t i : component) frames.push_back(FrameOf(problem, i));
-    std::sort(frames.begin(), frames.end());
-    frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+    for (const int64_t i : component) frames.push_back(problem.FrameOf(i));
+    SortUnique(&frames);
     const ProblemSubset subset(problem, std::move(component));
     const KnownRotationProblem& own = subset.problem();
     std::vector<int32_t> parts = FindParts(own, {});
     if (*std::max_element(parts.begin(), parts.end()) == 0) continue;
     Estimate placed = subset.Restrict(estimate);
-    std::vector<int32_t> all(own.num_points);
-    std::iota(all.begin(), all.end(), 0);
-    PlacePointsRobustly(own, all, Norm::L2(), cap, context, &placed);
+    PlacePointsRobustly(own, AllPoints(own), Norm::L2(), cap, context, &placed);
     if (!HasBaseline(own)) NormalizeScale(own, &placed);
     std::vector<int32_t> point_part(own.num_points);
     for (int32_t k = 0; k < own.num_points; ++k) {
-      point_part[k] = parts[FrameOf(own, own.point_begin[k])];
+      point_part[k] = parts[own.FrameOf(own.point_begin[k])];
     }
     for (WeakLink& link : Joiner(own, std::move(parts), std::move(point_part),
                                  cap, /*may_move=*/false, context, &placed)

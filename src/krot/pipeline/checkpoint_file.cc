@@ -19,8 +19,7 @@ std::string Reason() { return std::generic_category().message(errno); }
 }
 
 [[noreturn]] void ThrowNotWritten(const std::string& name) {
-  throw WriteError(
-      name + ": cannot be written: " + std::generic_category().message(errno));
+  throw WriteError(name + ": cannot be written: " + Reason());
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "krot/pipeline/pixel_proof.h"
+#include "krot/pipeline/stages.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,16 +14,9 @@
 namespace krot::internal {
 namespace {
 
-// Relative gap to which the problem of the support is solved: far below any gap
-// that users ask for.
-constexpr double kGap = 1e-7;
 // If lenses lower the bound by less than this, relative, another solve is not
 // worth its time.
 constexpr double kNegligibleLoss = 1e-6;
-constexpr int kMaxSolves = 4;
-// A larger support is not solved as a problem of its own: that would take as
-// long as the whole problem did.
-constexpr size_t kLargeSupport = 20000;
 
 // For a certificate whose rows have been taken anew since it was made: repairs
 // its multipliers for the new rows, which is cheaper than solving them.
@@ -42,10 +35,11 @@ std::optional<PixelCertificate> ProveByRepair(const Model& model,
   const ProblemSubset part(built.problem, support);
   CertificateOptions options;
   options.sufficient_bound = (1 + kNegligibleLoss) * sufficient;
-  CertificateSearch search(part.problem(), norm, options, context);
-  search.TryAll(part.Restrict(x_hat), multipliers);
-  if (!search.best()) return std::nullopt;
-  const Certificate rows = InWhole(part, *search.best());
+  const std::optional<Certificate> repaired =
+      RepairCertificate(part.problem(), norm, part.Restrict(x_hat), multipliers,
+                        options, context);
+  if (!repaired) return std::nullopt;
+  const Certificate rows = InWhole(part, *repaired);
   return MakePixelCertificate(model, built, norm, rows,
                               BearingsOfPoints(model, built, x_hat, rows),
                               context);
@@ -63,8 +57,8 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
   std::optional<PixelCertificate> best;
   JointOptions options;
   options.norm = norm;
-  options.relative_gap = kGap;
-  for (int solve = 0; solve < kMaxSolves && !support.empty(); ++solve) {
+  options.relative_gap = 1e-7;  // far below any that users ask for
+  for (int solve = 0; solve < 4 && !support.empty(); ++solve) {
     const ProblemSubset part(built.problem, support);
     KnownRotationProblem rows = part.problem();
     for (size_t n = 0; n < support.size(); ++n) {
@@ -117,16 +111,6 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
 
 namespace {
 
-std::optional<PixelCertificate> ProveLinear(const Model& model,
-                                            const BuiltProblem& built,
-                                            const Estimate& x_hat, Norm norm,
-                                            const Certificate& certificate,
-                                            const Context& context) {
-  return MakePixelCertificate(
-      model, built, norm, certificate,
-      BearingsOfPoints(model, built, x_hat, certificate), context);
-}
-
 void NameValues(StepValues* values, std::optional<PixelCertificate>* proof) {
   values->Optional(proof, [&](PixelCertificate* p) {
     values->Value(&p->lower_bound);
@@ -147,9 +131,13 @@ std::optional<PixelCertificate> ProveHere(const Model& model,
                                           double sufficient,
                                           const Context& context) {
   if (certificate != nullptr && Reprojection(model, built).IsLinear()) {
-    return ProveLinear(model, built, x_hat, norm, *certificate, context);
+    return MakePixelCertificate(
+        model, built, norm, *certificate,
+        BearingsOfPoints(model, built, x_hat, *certificate), context);
   }
-  if (certificate != nullptr && support.size() > kLargeSupport) {
+  // To solve a large support as a problem of its own would take as long as the
+  // whole problem did.
+  if (certificate != nullptr && support.size() > 20000) {
     return ProveByRepair(model, built, x_hat, norm, *certificate, sufficient,
                          context);
   }

@@ -8,34 +8,17 @@
 #include <vector>
 
 #include "krot/convert/reprojection.h"
-#include "krot/pipeline/known_positions.h"
-#include "krot/pipeline/pixel_proof.h"
-#include "krot/pipeline/trust_regions.h"
+#include "krot/pipeline/rounds.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 
 namespace krot::internal {
 namespace {
 
-constexpr int kMaxRounds = 30;
-// A round that lowers the true cost by less than this, relative, is idle.
-constexpr double kStationary = 1e-6;
-// While trust regions are being tightened, this many idle rounds in a row end
-// the solve; otherwise one does.
-constexpr int kPatience = 3;
-// An observation keeps what its linear row promised if its true error exceeds
-// the rows' cost by at most this, relative.
-constexpr double kKeptPromise = 1e-5;
 // If sweeps have lowered the true cost to this share of what it was, and the
 // rows' cost is at most this share of the true one, the rows no longer describe
 // the true errors and are taken anew.
 constexpr double kFarFromRows = 0.5;
-// If the cost of rows exceeds the true cost at the estimate where they are
-// taken by more than this, relative, rounding has made them useless.
-constexpr double kRowsRounding = 1e-3;
-// Where positions are known, rows are solved to this share of the gap asked
-// for.
-constexpr double kShareWithPositions = 0.05;
 
 class Rounds {
  public:
@@ -56,11 +39,40 @@ class Rounds {
         cost_(LevelledCost(estimate_)),
         bounds_(options.joint.relative_gap) {
     if (positions_.Any()) {
-      rows_options_.joint.relative_gap *= kShareWithPositions;
+      rows_options_.joint.relative_gap *= 0.05;
     }
   }
 
-  void Run();
+  void Run() {
+    summary_.cost_initial = PixelCost();
+    if (method_ != SolveMethod::kResInt && IsZeroUpToRounding(ReachedCost())) {
+      summary_.termination = SolveTermination::kZeroCost;
+      summary_.cost_final = ReachedCost();
+      return;
+    }
+    reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
+    while (RunOne() && summary_.rounds.size() < 30) {
+    }
+    if (IsRefuted()) return;
+    if (!certificate() && !IsInterrupted()) Prove();
+    if (std::isfinite(positions_.cost())) {
+      estimate_ = positions_.estimate();
+      reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
+    }
+    summary_.cost_final = cost_ = PixelCost();
+    if (IsZeroUpToRounding(cost_) && method_ != SolveMethod::kResInt &&
+        !IsInterrupted()) {
+      summary_.termination = SolveTermination::kZeroCost;
+    } else if (IsGapReached() && !IsInterrupted()) {
+      summary_.termination = SolveTermination::kGapReached;
+    } else if (summary_.termination == SolveTermination::kGapReached ||
+               summary_.termination == SolveTermination::kZeroCost ||
+               summary_.termination == SolveTermination::kNotRun) {
+      summary_.termination =
+          SolveTermination::kStalled;  // only rows reached it
+    }
+  }
+
   const std::optional<PixelCertificate>& certificate() const {
     return bounds_.proof();
   }
@@ -101,10 +113,143 @@ class Rounds {
            (summary_.termination == SolveTermination::kMaxSweeps &&
             options_.res_int.update_frames);
   }
-  bool HaveRowsServed(const Estimate& swept, double linear_cost);
-  bool RunOne();
-  void Prove();
-  bool TakeLevel(double optimum);
+
+  // Whether sweeps came so far that solving the rows would be in vain: because
+  // the cost is near enough to a bound, or because the rows no longer describe
+  // the true errors.
+  bool HaveRowsServed(const Estimate& swept, double linear_cost) {
+    if (reprojection_.IsLinear() || positions_.Any()) return false;
+    const double cost = TrueCost(swept);
+    is_bound_near_ = bounds_.IsNear(cost);
+    return is_bound_near_ ||
+           (cost <= kFarFromRows * cost_ && linear_cost <= kFarFromRows * cost);
+  }
+
+  // Runs a round. Returns whether another one may lower the cost.
+  bool RunOne() {
+    context_.Stage("lowering the largest error, round " +
+                   std::to_string(summary_.rounds.size() + 1));
+    const KnownRotationProblem& rows = built_.problem;
+    std::optional<KnownRotationProblem> bounded;
+    std::vector<int64_t> observation_of;
+    const bool is_bounded = AnyRank(context_, !trust_.IsEmpty());
+    if (is_bounded) {
+      bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of);
+    }
+    const KnownRotationProblem& problem = bounded ? *bounded : rows;
+    // A depth that consists of rounding alone makes the rows useless: their
+    // cost exceeds the true one where they were taken.
+    const double rows_cost = RowsCost(problem, estimate_);
+    if (!std::isfinite(rows_cost) ||
+        (is_bounded && !positions_.Any() && rows_cost > (1 + 1e-3) * cost_)) {
+      return false;
+    }
+    Estimate solved = estimate_;
+    is_bound_near_ = false;
+    std::optional<Certificate> of_these = SolveRows(
+        problem, rows_options_, method_, summary_.rounds.empty(),
+        [this](const Estimate& swept, double linear_cost) {
+          return HaveRowsServed(swept, linear_cost);
+        },
+        context_, timer_, &solved, bounded ? nullptr : &known_multipliers_,
+        &summary_);
+    if (options_.res_int.update_frames) {
+      RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_, &solved);
+    }
+
+    Round round;
+    round.linear_cost = RowsCost(rows, solved);
+    if (of_these && !is_bounded) {
+      round.linear_lower_bound = of_these->lower_bound;
+    }
+    if (!is_bound_near_) {
+      bounds_.SetRows(
+          of_these ? std::optional(RowsCertificate{*std::move(of_these),
+                                                   std::move(observation_of)})
+                   : std::nullopt);
+    }
+    const double before = cost_;
+    Estimate from = std::exchange(estimate_, Estimate());
+    if (options_.res_int.update_frames) {
+      estimate_ = BestOnSegment(reprojection_, from, solved, options_.norm,
+                                context_, &round.step);
+    } else {
+      estimate_ = BestPointsOnSegments(reprojection_, rows, from, solved,
+                                       options_.norm, context_.num_threads);
+      round.step = 1;
+    }
+    cost_ = LevelledCost(estimate_);
+    int64_t num_bounded = 0;
+    if (round.step < 1) {
+      // Rounding does not break a row's promise.
+      num_bounded =
+          SumOfRanks(context_, trust_.Shrink(reprojection_, rows, from, solved,
+                                             options_.norm,
+                                             (1 + 1e-5) * round.linear_cost));
+    } else {
+      trust_.Clear();
+    }
+    reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
+    const bool has_level = positions_.Any() && TakeLevel(round.linear_cost);
+    const bool is_tried =
+        !has_level && !IsRefuted() && bounds_.IsWorthProving(cost_);
+    if (is_tried) Prove();
+
+    round.cost = PixelCost();
+    if (certificate()) round.lower_bound = certificate()->lower_bound;
+    round.seconds = timer_.Seconds();
+    summary_.rounds.push_back(round);
+    // The published algorithms solve one linear problem only.
+    const bool is_as_in_paper =
+        options_.res_int.fast_descent.settings == FastDescentSettings::kPaper;
+    if (reprojection_.IsLinear() || is_as_in_paper || IsUsedUp() ||
+        IsRefuted() || IsInterrupted() || IsGapReached() ||
+        IsZeroUpToRounding(cost_)) {
+      return false;
+    }
+    if (has_level || is_bound_near_) return true;
+    const bool is_idle = !(cost_ < (1 - 1e-6) * before);
+    num_idle_rounds_ = is_idle ? num_idle_rounds_ + 1 : 0;
+    if (round.linear_cost <= kFarFromRows * cost_) known_multipliers_ = {};
+    // One idle round is enough without trust regions. It is enough, too, if the
+    // cost is near the rows' bound but that proves nothing in true pixels: then
+    // the estimate is a local minimum only.
+    if (num_bounded == 0 || (is_tried && !certificate())) return !is_idle;
+    return num_idle_rounds_ < 3;
+  }
+
+  // Tries to prove a bound in true pixels from the last round's certificate of
+  // the rows, which is used up.
+  void Prove() {
+    const std::optional<RowsCertificate> rows = bounds_.UseRows();
+    if (!rows) return;
+    context_.Stage("proving the bound in true pixels");
+    const double sufficient = bounds_.Sufficient(cost_);
+    bounds_.Improve(
+        positions_.Any()
+            ? positions_.Prove(estimate_, SupportOf(*rows), sufficient)
+            : ProveRows(model_, built_, estimate_, options_, *rows, sufficient,
+                        context_));
+  }
+
+  // Where positions are known: whether the next round has another level. Ends
+  // the solve as kInfeasible if no estimate that keeps the positions is good
+  // enough.
+  bool TakeLevel(double optimum) {
+    positions_.Keep(estimate_);
+    if (const auto& rows = bounds_.rows()) {
+      std::optional<PixelCertificate> refutation =
+          positions_.Refute(estimate_, rows->certificate, SupportOf(*rows));
+      if (refutation) {
+        bounds_.SetProof(std::move(refutation));
+        summary_.termination = SolveTermination::kInfeasible;
+        return false;
+      }
+    }
+    const bool is_another = positions_.TakeLevel(estimate_, optimum, cost_);
+    if (is_another) cost_ = LevelledCost(estimate_);
+    return is_another;
+  }
 
   const Model& model_;
   const SolveModelOptions options_;
@@ -127,168 +272,6 @@ class Rounds {
   // From the last round without trust regions, to warm-start the next one.
   KnownMultipliers known_multipliers_;
 };
-
-// Tries to prove a bound in true pixels from the last round's certificate of
-// the rows, which is used up.
-void Rounds::Prove() {
-  const std::optional<RowsCertificate> rows = bounds_.UseRows();
-  if (!rows) return;
-  context_.Stage("proving the bound in true pixels");
-  const double sufficient = bounds_.Sufficient(cost_);
-  bounds_.Improve(
-      positions_.Any()
-          ? positions_.Prove(estimate_, SupportOf(*rows), sufficient)
-          : ProveRows(model_, built_, estimate_, options_, *rows, sufficient,
-                      context_));
-}
-
-// Where positions are known: whether the next round has another level. Ends the
-// solve as kInfeasible if no estimate that keeps the positions is good enough.
-bool Rounds::TakeLevel(double optimum) {
-  positions_.Keep(estimate_);
-  if (const auto& rows = bounds_.rows()) {
-    std::optional<PixelCertificate> refutation =
-        positions_.Refute(estimate_, rows->certificate, SupportOf(*rows));
-    if (refutation) {
-      bounds_.SetProof(std::move(refutation));
-      summary_.termination = SolveTermination::kInfeasible;
-      return false;
-    }
-  }
-  const bool is_another = positions_.TakeLevel(estimate_, optimum, cost_);
-  if (is_another) cost_ = LevelledCost(estimate_);
-  return is_another;
-}
-
-// Whether sweeps came so far that solving the rows would be in vain: because
-// the cost is near enough to a bound, or because the rows no longer describe
-// the true errors.
-bool Rounds::HaveRowsServed(const Estimate& swept, double linear_cost) {
-  if (reprojection_.IsLinear() || positions_.Any()) return false;
-  const double cost = TrueCost(swept);
-  is_bound_near_ = bounds_.IsNear(cost);
-  return is_bound_near_ ||
-         (cost <= kFarFromRows * cost_ && linear_cost <= kFarFromRows * cost);
-}
-
-// Runs a round. Returns whether another one may lower the cost.
-bool Rounds::RunOne() {
-  context_.Stage("lowering the largest error, round " +
-                 std::to_string(summary_.rounds.size() + 1));
-  const KnownRotationProblem& rows = built_.problem;
-  std::optional<KnownRotationProblem> bounded;
-  std::vector<int64_t> observation_of;
-  const bool is_bounded = AnyRank(context_, !trust_.IsEmpty());
-  if (is_bounded) {
-    bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of);
-  }
-  const KnownRotationProblem& problem = bounded ? *bounded : rows;
-  // A depth that consists of rounding alone makes the rows useless.
-  const double rows_cost = RowsCost(problem, estimate_);
-  if (!std::isfinite(rows_cost) || (is_bounded && !positions_.Any() &&
-                                    rows_cost > (1 + kRowsRounding) * cost_)) {
-    return false;
-  }
-  Estimate solved = estimate_;
-  is_bound_near_ = false;
-  std::optional<Certificate> of_these = SolveRows(
-      problem, rows_options_, method_, summary_.rounds.empty(),
-      [this](const Estimate& swept, double linear_cost) {
-        return HaveRowsServed(swept, linear_cost);
-      },
-      context_, timer_, &solved, bounded ? nullptr : &known_multipliers_,
-      &summary_);
-  if (options_.res_int.update_frames) {
-    RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_, &solved);
-  }
-
-  Round round;
-  round.linear_cost = RowsCost(rows, solved);
-  if (of_these && !is_bounded) {
-    round.linear_lower_bound = of_these->lower_bound;
-  }
-  if (!is_bound_near_) {
-    bounds_.SetRows(of_these
-                        ? std::optional(RowsCertificate{
-                              *std::move(of_these), std::move(observation_of)})
-                        : std::nullopt);
-  }
-  const double before = cost_;
-  Estimate from = std::exchange(estimate_, Estimate());
-  if (options_.res_int.update_frames) {
-    estimate_ = BestOnSegment(reprojection_, from, solved, options_.norm,
-                              context_, &round.step);
-  } else {
-    estimate_ = BestPointsOnSegments(reprojection_, rows, from, solved,
-                                     options_.norm, context_.num_threads);
-    round.step = 1;
-  }
-  cost_ = LevelledCost(estimate_);
-  int64_t num_bounded = 0;
-  if (round.step < 1) {
-    num_bounded = SumOfRanks(
-        context_,
-        trust_.Shrink(reprojection_, rows, from, solved, options_.norm,
-                      (1 + kKeptPromise) * round.linear_cost));
-  } else {
-    trust_.Clear();
-  }
-  reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
-  const bool has_level = positions_.Any() && TakeLevel(round.linear_cost);
-  const bool is_tried =
-      !has_level && !IsRefuted() && bounds_.IsWorthProving(cost_);
-  if (is_tried) Prove();
-
-  round.cost = PixelCost();
-  if (certificate()) round.lower_bound = certificate()->lower_bound;
-  round.seconds = timer_.Seconds();
-  summary_.rounds.push_back(round);
-  // The published algorithms solve one linear problem only.
-  const bool is_as_in_paper =
-      options_.res_int.fast_descent.settings == FastDescentSettings::kPaper;
-  if (reprojection_.IsLinear() || is_as_in_paper || IsUsedUp() || IsRefuted() ||
-      IsInterrupted() || IsGapReached() || IsZeroUpToRounding(cost_)) {
-    return false;
-  }
-  if (has_level || is_bound_near_) return true;
-  const bool is_idle = !(cost_ < (1 - kStationary) * before);
-  num_idle_rounds_ = is_idle ? num_idle_rounds_ + 1 : 0;
-  if (round.linear_cost <= kFarFromRows * cost_) known_multipliers_ = {};
-  // One idle round is enough without trust regions. It is enough, too, if the
-  // cost is near the rows' bound but that proves nothing in true pixels: then
-  // the estimate is a local minimum only.
-  if (num_bounded == 0 || (is_tried && !certificate())) return !is_idle;
-  return num_idle_rounds_ < kPatience;
-}
-
-void Rounds::Run() {
-  summary_.cost_initial = PixelCost();
-  if (method_ != SolveMethod::kResInt && IsZeroUpToRounding(ReachedCost())) {
-    summary_.termination = SolveTermination::kZeroCost;
-    summary_.cost_final = ReachedCost();
-    return;
-  }
-  reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
-  while (RunOne() && summary_.rounds.size() < kMaxRounds) {
-  }
-  if (IsRefuted()) return;
-  if (!certificate() && !IsInterrupted()) Prove();
-  if (std::isfinite(positions_.cost())) {
-    estimate_ = positions_.estimate();
-    reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
-  }
-  summary_.cost_final = cost_ = PixelCost();
-  if (IsZeroUpToRounding(cost_) && method_ != SolveMethod::kResInt &&
-      !IsInterrupted()) {
-    summary_.termination = SolveTermination::kZeroCost;
-  } else if (IsGapReached() && !IsInterrupted()) {
-    summary_.termination = SolveTermination::kGapReached;
-  } else if (summary_.termination == SolveTermination::kGapReached ||
-             summary_.termination == SolveTermination::kZeroCost ||
-             summary_.termination == SolveTermination::kNotRun) {
-    summary_.termination = SolveTermination::kStalled;  // only rows reached it
-  }
-}
 
 }  // namespace
 

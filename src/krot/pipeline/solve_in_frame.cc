@@ -12,7 +12,8 @@
 #include "krot/base/context.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
-#include "krot/pipeline/pixel_proof.h"
+#include "krot/model/rigs.h"
+#include "krot/model/model_io.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
@@ -20,12 +21,6 @@
 
 namespace krot::internal {
 namespace {
-
-// If the joint solver stalls with a gap above this, relative, the answer is
-// called unproved.
-constexpr double kGapOfAnswer = 1e-2;
-// The level at which a start keeps positions, as a share of its bound.
-constexpr double kShareOfStart = 0.99;
 
 void CheckOptions(const SolveModelOptions& options, const Context& context) {
   if (options.problem.fixed.Any())
@@ -117,7 +112,7 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
   } else if (is_within(wanted_gap)) {
     summary->termination = SolveTermination::kGapReached;
   } else {
-    summary->termination = is_within(kGapOfAnswer)
+    summary->termination = is_within(/*gap=*/1e-2)
                                ? SolveTermination::kStalled
                                : SolveTermination::kUnproved;
   }
@@ -134,8 +129,7 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   }
   // If there is no start, rows of this level prove a bound for the positions:
   // their level must be below it.
-  TakePositionRowsOfStart(kShareOfStart * options.init_max_error,
-                          &start->built);
+  TakePositionRowsOfStart(0.99 * options.init_max_error, &start->built);
   FoundStart found =
       FindFeasibleStart(start->built.problem, options, context,
                         LogIterations(options.joint.callback, timer, summary));
@@ -236,6 +230,24 @@ bool IsUnderdetermined(const SolveSummary& summary,
              3 * (summary.num_frames - summary.num_fixed_frames +
                   summary.num_points - summary.num_fixed_points) -
                  gauge;
+}
+
+// Sets `moved` of the loose images and points: how far they have moved between
+// two models with the same images and points.
+void MeasureMoves(const Model& before, const Model& after, LooseParts* loose) {
+  const std::vector<ImageGeometry> from = ImageGeometries(before);
+  const std::vector<ImageGeometry> to = ImageGeometries(after);
+  const IdIndex<ImageId> images(before.images);
+  for (LooseImage& image : loose->images) {
+    const int32_t n = *images.Find(image.image_id);
+    image.moved =
+        (Center(to[n].cam_from_world) - Center(from[n].cam_from_world)).norm();
+  }
+  const IdIndex<Point3DId> points(before.points3D);
+  for (LoosePoint& point : loose->points) {
+    const int32_t n = *points.Find(point.point3D_id);
+    point.moved = (after.points3D[n].xyz - before.points3D[n].xyz).norm();
+  }
 }
 
 }  // namespace

@@ -108,10 +108,6 @@ LooseParts SettleEstimate(const Model& model, const BuiltProblem& built,
                           const SettleOptions& options, const Context& context,
                           Estimate* estimate);
 
-// Sets `moved` of the loose images and points: how far they have moved between
-// two models with the same images and points. O(images + points).
-void MeasureMoves(const Model& before, const Model& after, LooseParts* loose);
-
 // The solve of a COLMAP model: lowers its largest reprojection error. `krot
 // solver` and `krot point_triangulator` call it between reading and writing.
 

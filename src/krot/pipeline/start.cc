@@ -159,31 +159,15 @@ FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
     log(static_cast<int>(num_logged) + 1, summary.iterations[num_logged]);
   }
   FoundStart start;
-  switch (summary.termination) {
-    case InitializerTermination::kFeasible:
-      start.estimate = std::move(estimate);
-      break;
-    case InitializerTermination::kInfeasible:
-      start.termination = SolveTermination::kInfeasible;
-      start.certificate = std::move(summary.certificate);
-      break;
-    case InitializerTermination::kInterrupted:
-      start.termination = SolveTermination::kInterrupted;
-      break;
-    case InitializerTermination::kNotRun:
-    case InitializerTermination::kFailed:
-      start.termination = SolveTermination::kNoStart;
-      break;
+  start.termination = summary.termination;
+  if (start.termination == SolveTermination::kWithinBound) {
+    start.estimate = std::move(estimate);
   }
+  start.certificate = std::move(summary.certificate);
   return start;
 }
 
 namespace {
-
-// After a stall with a gap within this many times the one asked for, no other
-// way is tried.
-constexpr double kGapsOfAnswer = 10;
-constexpr size_t kFewIterations = 100;
 
 bool IsWithin(double relative_gap,
               const std::optional<PixelCertificate>& certificate, double cost) {
@@ -217,14 +201,15 @@ void TryOtherWays(const Model& model, const SolveModelOptions& options,
   SolveModelOptions other_options = options;
   other_options.joint.max_iterations = std::min(
       options.joint.max_iterations,
-      static_cast<int>(std::max(kFewIterations, summary->iterations.size())));
+      static_cast<int>(std::max<size_t>(100, summary->iterations.size())));
   // Sweeps leave points where they are, in a camera, and their depths consist
   // of rounding. The way without sweeps comes first then.
   const bool is_own_first =
       HasPointsInCameras(start->built.problem, start->built.start);
   for (const bool is_own : {is_own_first, !is_own_first}) {
+    // A stall with a gap of a few times the one asked for is an answer.
     if (summary->termination != SolveTermination::kStalled ||
-        IsWithin(kGapsOfAnswer * options.joint.relative_gap, *certificate,
+        IsWithin(10 * options.joint.relative_gap, *certificate,
                  summary->cost_final)) {
       return;
     }

@@ -38,6 +38,24 @@ struct Observation {
 // E = [e3'; J (I2 | -u)].
 Eigen::Matrix3d RowAtRay(const Eigen::Vector2d& u, const Eigen::Matrix2d& J);
 
+// What a loop `for (i : range)` goes through.
+template <typename Iterator>
+struct Range {
+  Iterator first, last;
+  Iterator begin() const { return first; }
+  Iterator end() const { return last; }
+};
+
+struct IndexIterator {
+  int64_t index;
+  int64_t operator*() const { return index; }
+  IndexIterator& operator++() {
+    ++index;
+    return *this;
+  }
+  bool operator!=(IndexIterator other) const { return index != other.index; }
+};
+
 // The observations are sorted by point; an index lists them by frame.
 struct KnownRotationProblem {
   int32_t num_frames = 0;
@@ -54,6 +72,17 @@ struct KnownRotationProblem {
   // point, is fixed. Every estimate of the problem must have them.
   std::vector<std::optional<Eigen::Vector3d>> fixed_translations;
   std::vector<std::optional<Eigen::Vector3d>> fixed_points;
+
+  // The indices of point k's observations, and of frame f's; ascending.
+  Range<IndexIterator> OfPoint(int64_t k) const {
+    return {{point_begin[k]}, {point_begin[k + 1]}};
+  }
+  Range<const int32_t*> OfFrame(int64_t f) const {
+    return {frame_observations.data() + frame_begin[f],
+            frame_observations.data() + frame_begin[f + 1]};
+  }
+  // The frame of observation i.
+  int32_t FrameOf(int64_t i) const { return views[observations[i].view].frame; }
 
   bool IsFixedFrame(int32_t f) const {
     return !fixed_translations.empty() && fixed_translations[f].has_value();

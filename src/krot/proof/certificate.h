@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -98,79 +97,12 @@ std::optional<Certificate> MakeInfeasibilityCertificate(
 // A certificate of a part, with the observation indices of the whole problem.
 Certificate InWhole(const ProblemSubset& part, Certificate certificate);
 
-// Looks for certificates and keeps the best one that the check accepts. It
-// tries several sets of multipliers:
-//
-//   Offer           repairs the given ones
-//   TryBalanced     repairs only those that are nearly stationary, without
-//                   misfits
-//   SolveAndReduce  those at the optimum of the observations' own problem; then
-//                   of the problem that sets its maximum, and so on
-//   TryAll          those of all observations, where too many set the maximum
-//
-// All of them end in Offer, which keeps the best, and none goes on once
-// IsEnough().
-class CertificateSearch {
- public:
-  CertificateSearch(const KnownRotationProblem& problem, Norm norm,
-                    const CertificateOptions& options, const Context& context)
-      : problem_(problem), norm_(norm), options_(options), context_(context) {}
-
-  // Tries the multipliers of these observations, which must be connected, as
-  // they are; then only those that are nearly stationary. With a threshold (of
-  // SelectSupport) it then solves the observations' own problem, starting from
-  // `estimate` of the whole, and after that the problem of the observations
-  // that set its maximum, and so on.
-  void Try(const std::vector<int64_t>& observations, const Estimate& estimate,
-           const std::vector<Multiplier>& multipliers,
-           std::optional<double> threshold_to_solve);
-
-  // Tries the multipliers of all observations, without points that frames can
-  // spare (SelectForFrames).
-  void TryAll(const Estimate& estimate,
-              const std::vector<Multiplier>& multipliers);
-
-  // Tries those of the candidates' multipliers that are nearly stationary at
-  // `delta`, pixels (SelectBalanced).
-  void TryBalanced(double delta, const std::vector<Multiplier>& multipliers,
-                   const std::vector<int64_t>& candidates);
-
-  bool IsEnough() const {
-    return context_.IsCancelled() ||
-           best_.lower_bound >= options_.sufficient_bound;
-  }
-
-  std::optional<Certificate> best() const {
-    if (best_.observations.empty()) return std::nullopt;
-    return best_;
-  }
-
- private:
-  using DeltaOf = std::function<double(const ProblemSubset& part,
-                                       const std::vector<Multiplier>& known)>;
-
-  void SolveAndReduce(const ProblemSubset& part, const Estimate& whole,
-                      double threshold, int num_reductions);
-  // Offers each connected component that is not too large. Returns the
-  // observations of components that have misfits, without these, as they are
-  // worth another try.
-  std::vector<int64_t> OfferComponents(
-      const std::vector<int64_t>& observations,
-      const std::vector<Multiplier>& multipliers, int64_t max_unknowns,
-      const DeltaOf& delta_of);
-  // Repairs the part's multipliers, and keeps the result if it is the best so
-  // far and the check accepts it. Returns the misfits of the part.
-  std::vector<int64_t> Offer(const ProblemSubset& part, double delta,
-                             const std::vector<Multiplier>& multipliers);
-
-  const KnownRotationProblem& problem_;
-  const Norm norm_;
-  const CertificateOptions options_;
-  const Context context_;
-  Certificate best_;
-};
-
-// The number of unknowns of a problem, without those of one frame.
-int64_t NumUnknowns(const KnownRotationProblem& problem);
+// The highest bound that repaired multipliers of all observations prove,
+// without points that frames can spare (SelectForFrames): for rows that have
+// changed a little since their multipliers were found. None if there is none.
+std::optional<Certificate> RepairCertificate(
+    const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
+    const std::vector<Multiplier>& multipliers,
+    const CertificateOptions& options, const Context& context);
 
 }  // namespace krot::internal

@@ -137,28 +137,6 @@ using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
 
-// The margin of (2) below zero, relative to the size of its terms: well above
-// rounding, well below any gap.
-constexpr double kConstantMargin = 1e-8;
-// The claimed bound is lower by this, relative, to allow for the last
-// roundings.
-constexpr double kBoundMargin = 4e-13;
-// Lengthening y lowers the bound in first order, turning it in second order. So
-// the unit of changes along y is the room that is left up to lambda, but at
-// least this, relative to lambda.
-constexpr double kLengthWeight = 1e-3;
-// If a lambda would have to change by more than this, relative, the observation
-// is a misfit.
-constexpr double kMaxLambdaChange = 0.5;
-// After the first solve its own rounding is left, after the second only that of
-// Miss().
-constexpr int kNumRefinements = 2;
-// The limit of alternating projections; each costs two solves with the same
-// factor.
-constexpr int kMaxSteps = 20;
-// Projections end when a step raises the bound by less than this, relative.
-constexpr double kSmallestGain = 1e-9;
-
 // Coordinates that suit the dual ball |eta|_dual <= 1. For p = 2 the directions
 // (rows) are along y and across it; otherwise the ball is the square of
 // coordinates within [-1, 1].
@@ -201,21 +179,101 @@ class Repair {
          const RepairOptions& options)
       : norm_(norm),
         delta_(delta),
-        system_(problem, delta, multipliers, kConstantMargin),
+        // A margin well above rounding, well below any gap.
+        system_(problem, delta, multipliers, /*margin=*/1e-8),
         original_(multipliers),
         solver_(options.num_threads),
         now_(multipliers),
         sufficient_bound_(options.sufficient_bound) {}
 
-  RepairedMultipliers Run();
+  RepairedMultipliers Run() {
+    RepairedMultipliers repaired;
+    if (!Factorize()) return repaired;
+    std::optional<Certificate>& best = repaired.certificate;
+    // Each step costs two solves with the same factor.
+    for (int step = 0; step < 20; ++step) {
+      Balance();
+      const std::vector<int64_t> misfits = Misfits();
+      if (!misfits.empty()) {
+        if (!best) repaired.misfits = misfits;
+        break;
+      }
+      const double ratio = LongestRatio() / (1 - 4e-13);  // for last roundings
+      if (!(ratio > 0)) break;
+      const double bound = delta_ / ratio;
+      const double before = best ? best->lower_bound : 0;
+      if (bound > before) best = Divided(ratio);
+      if (bound >= sufficient_bound_) break;
+      if (bound < before * (1 + 1e-9) && step > 1) break;
+      Shorten();
+    }
+    return repaired;
+  }
 
  private:
-  bool Factorize();
-  void Balance();
-  std::vector<int64_t> Misfits() const;
-  double LongestRatio() const;
-  void Shorten();
-  Certificate Divided(double ratio) const;
+  bool Factorize() {
+    for (const Multiplier& m : original_) {
+      const DualFrame frame = MakeDualFrame(m.y / m.lambda, norm_);
+      // Lengthening y lowers the bound in first order, turning it in second
+      // order. So the unit of changes along y is the room that is left up to
+      // lambda, but at least a thousandth of lambda.
+      const Vector2d room = (1 - frame.coordinates.array().abs()).max(1e-3);
+      axes_.push_back(room.asDiagonal() * frame.directions);
+    }
+    return solver_.Factorize(system_.Changes(axes_));
+  }
+
+  // Makes the least change after which (1) and (2) hold, to rounding: that of
+  // the first solve is left after it, and only that of Miss() after the second.
+  void Balance() {
+    for (int n = 0; n < 2; ++n) {
+      const VectorXd step = solver_.Solve(-system_.Miss(now_));
+      for (size_t i = 0; i < now_.size(); ++i) {
+        const Eigen::Vector3d change =
+            step.segment<3>(3 * static_cast<int64_t>(i));
+        const Multiplier& unit = original_[i];
+        now_[i].lambda += unit.lambda * change[2];
+        now_[i].y += unit.lambda * (axes_[i].transpose() * change.head<2>()) +
+                     change[2] * unit.y;
+      }
+    }
+  }
+
+  std::vector<int64_t> Misfits() const {
+    std::vector<int64_t> misfits;
+    for (size_t i = 0; i < now_.size(); ++i) {
+      if (!(std::abs(now_[i].lambda / original_[i].lambda - 1) < 0.5)) {
+        misfits.push_back(static_cast<int64_t>(i));
+      }
+    }
+    return misfits;
+  }
+
+  double LongestRatio() const {
+    double longest = 0;
+    for (const Multiplier& m : now_) {
+      longest = std::max(longest, DualNorm(m.y, norm_) / m.lambda);
+    }
+    return longest;
+  }
+
+  void Shorten() {
+    for (Multiplier& m : now_) {
+      const DualFrame frame = MakeDualFrame(m.y / m.lambda, norm_);
+      const Vector2d shortened = frame.coordinates.cwiseMin(1.0).cwiseMax(-1.0);
+      m.y = m.lambda * (frame.directions.transpose() * shortened);
+    }
+  }
+
+  Certificate Divided(double ratio) const {
+    Certificate certificate;
+    certificate.lower_bound = delta_ / ratio;
+    for (size_t i = 0; i < now_.size(); ++i) {
+      certificate.observations.push_back(
+          {static_cast<int64_t>(i), now_[i].lambda, now_[i].y / ratio});
+    }
+    return certificate;
+  }
 
   const Norm norm_;
   const double delta_;
@@ -226,91 +284,6 @@ class Repair {
   std::vector<Multiplier> now_;
   const double sufficient_bound_;
 };
-
-bool Repair::Factorize() {
-  for (const Multiplier& m : original_) {
-    const DualFrame frame = MakeDualFrame(m.y / m.lambda, norm_);
-    const Vector2d room =
-        (1 - frame.coordinates.array().abs()).max(kLengthWeight);
-    axes_.push_back(room.asDiagonal() * frame.directions);
-  }
-  return solver_.Factorize(system_.Changes(axes_));
-}
-
-// Makes the least change after which (1) and (2) hold, to rounding.
-void Repair::Balance() {
-  for (int n = 0; n < kNumRefinements; ++n) {
-    const VectorXd step = solver_.Solve(-system_.Miss(now_));
-    for (size_t i = 0; i < now_.size(); ++i) {
-      const Eigen::Vector3d change =
-          step.segment<3>(3 * static_cast<int64_t>(i));
-      const Multiplier& unit = original_[i];
-      now_[i].lambda += unit.lambda * change[2];
-      now_[i].y += unit.lambda * (axes_[i].transpose() * change.head<2>()) +
-                   change[2] * unit.y;
-    }
-  }
-}
-
-std::vector<int64_t> Repair::Misfits() const {
-  std::vector<int64_t> misfits;
-  for (size_t i = 0; i < now_.size(); ++i) {
-    if (!(std::abs(now_[i].lambda / original_[i].lambda - 1) <
-          kMaxLambdaChange)) {
-      misfits.push_back(static_cast<int64_t>(i));
-    }
-  }
-  return misfits;
-}
-
-double Repair::LongestRatio() const {
-  double longest = 0;
-  for (const Multiplier& m : now_) {
-    longest = std::max(longest, DualNorm(m.y, norm_) / m.lambda);
-  }
-  return longest;
-}
-
-void Repair::Shorten() {
-  for (Multiplier& m : now_) {
-    const DualFrame frame = MakeDualFrame(m.y / m.lambda, norm_);
-    const Vector2d shortened = frame.coordinates.cwiseMin(1.0).cwiseMax(-1.0);
-    m.y = m.lambda * (frame.directions.transpose() * shortened);
-  }
-}
-
-Certificate Repair::Divided(double ratio) const {
-  Certificate certificate;
-  certificate.lower_bound = delta_ / ratio;
-  for (size_t i = 0; i < now_.size(); ++i) {
-    certificate.observations.push_back(
-        {static_cast<int64_t>(i), now_[i].lambda, now_[i].y / ratio});
-  }
-  return certificate;
-}
-
-RepairedMultipliers Repair::Run() {
-  RepairedMultipliers repaired;
-  if (!Factorize()) return repaired;
-  std::optional<Certificate>& best = repaired.certificate;
-  for (int step = 0; step < kMaxSteps; ++step) {
-    Balance();
-    const std::vector<int64_t> misfits = Misfits();
-    if (!misfits.empty()) {
-      if (!best) repaired.misfits = misfits;
-      break;
-    }
-    const double ratio = LongestRatio() / (1 - kBoundMargin);
-    if (!(ratio > 0)) break;
-    const double bound = delta_ / ratio;
-    const double before = best ? best->lower_bound : 0;
-    if (bound > before) best = Divided(ratio);
-    if (bound >= sufficient_bound_) break;
-    if (bound < before * (1 + kSmallestGain) && step > 1) break;
-    Shorten();
-  }
-  return repaired;
-}
 
 }  // namespace
 

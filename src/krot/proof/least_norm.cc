@@ -103,14 +103,6 @@ VectorXd BlockAngularQr::SolveLeastNorm(const VectorXd& rhs) const {
   return x;
 }
 
-namespace {
-
-// If less than this share of the squared length of the last row is outside the
-// span of the others, it depends on them.
-constexpr double kSmallestLastRow = 1e-20;
-
-}  // namespace
-
 std::vector<int64_t> LeastNormProblem::EquationsOfPoints() const {
   std::vector<int64_t> first(num_points);
   int64_t next = 0;
@@ -224,7 +216,7 @@ bool LeastNormSolver::FactorizeByPoints() {
   by_points_->SolveRefined(nullptr, last_row_.data(), &x, in_span.data());
   last_row_ -= in_span;
   last_row_norm2_ = last_row_.squaredNorm();
-  return last_row_norm2_ > kSmallestLastRow * norm2;
+  return last_row_norm2_ > 1e-20 * norm2;  // else it depends on the others
 }
 
 VectorXd LeastNormSolver::SolveByPoints(const VectorXd& rhs) const {

@@ -96,14 +96,12 @@ std::vector<int64_t> SelectLarge(const std::vector<Multiplier>& multipliers,
 std::vector<int64_t> SelectForFrames(const KnownRotationProblem& problem,
                                      const std::vector<Multiplier>& multipliers,
                                      double share) {
-  const auto frame_of = [&](int64_t i) {
-    return problem.views[problem.observations[i].view].frame;
-  };
   std::vector<double> of_point(problem.num_points, 0);
   std::vector<double> spare(problem.num_frames, 0);
   for (size_t i = 0; i < multipliers.size(); ++i) {
     of_point[problem.observations[i].point] += multipliers[i].lambda;
-    spare[frame_of(static_cast<int64_t>(i))] += share * multipliers[i].lambda;
+    spare[problem.FrameOf(static_cast<int64_t>(i))] +=
+        share * multipliers[i].lambda;
   }
   std::vector<int32_t> lightest(problem.num_points);
   std::iota(lightest.begin(), lightest.end(), 0);
@@ -115,14 +113,14 @@ std::vector<int64_t> SelectForFrames(const KnownRotationProblem& problem,
     bool can_leave = true;
     int64_t i = problem.point_begin[k];
     for (; i < problem.point_begin[k + 1] && can_leave; ++i) {
-      double& left = spare[frame_of(i)];
+      double& left = spare[problem.FrameOf(i)];
       left -= multipliers[i].lambda;
-      can_leave = left >= 0 || problem.IsFixedFrame(frame_of(i));
+      can_leave = left >= 0 || problem.IsFixedFrame(problem.FrameOf(i));
     }
     if (can_leave) continue;
     is_left[k] = 1;
     while (--i >= problem.point_begin[k]) {
-      spare[frame_of(i)] += multipliers[i].lambda;
+      spare[problem.FrameOf(i)] += multipliers[i].lambda;
     }
   }
   std::vector<int64_t> selected;

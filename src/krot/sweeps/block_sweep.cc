@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "krot/base/parallel_for.h"
@@ -21,8 +22,8 @@ std::vector<int32_t> CutFrames(const KnownRotationProblem& problem,
     counts.push_back(problem.frame_begin[f + 1] - problem.frame_begin[f]);
   }
   ranks->Reduce(std::plus<int64_t>(), &counts);
-  int64_t total = 0;
-  for (const int64_t count : counts) total += count;
+  const int64_t total =
+      std::accumulate(counts.begin(), counts.end(), int64_t{0});
   std::vector<int32_t> begin = {0};
   int64_t sum = 0;
   for (int32_t f = 0; f < problem.num_frames; ++f) {
@@ -34,11 +35,6 @@ std::vector<int32_t> CutFrames(const KnownRotationProblem& problem,
   begin.resize(ranks->count() + 1, problem.num_frames);
   return begin;
 }
-
-// The number of points that a thread solves at a time. More would not fit into
-// a core's cache. With fewer, lanes are idle more often, at the end of each
-// chunk.
-constexpr int64_t kPointsPerChunk = 512;
 
 // The observations of a frame are far apart in memory, and so are their points.
 // They are prefetched by this many observations: without that, sweeps take 6 to
@@ -139,8 +135,10 @@ BlockSweep::Worker* BlockSweep::WorkerOf(int worker) {
 
 double BlockSweep::IntersectPoints(Estimate* estimate) {
   cameras_ = CamerasFromWorld(problem_, estimate->translations);
+  // More points at a time would not fit into a core's cache. With fewer, lanes
+  // are idle more often, at the end of each chunk.
   return MaxOfRanks(context_,
-                    LargestOver(problem_.num_points, kPointsPerChunk,
+                    LargestOver(problem_.num_points, /*blocks_per_chunk=*/512,
                                 [&](int64_t begin, int64_t end, int worker) {
                                   return IntersectPoints(begin, end, worker,
                                                          estimate);
@@ -253,8 +251,7 @@ double BlockSweep::ChoosePoints(int64_t begin, int64_t end,
 void BlockSweep::AddPointRows(int32_t point,
                               SideBySideDescent::RowWriter* writer) const {
   double row[kResidualRow];
-  for (int64_t i = problem_.point_begin[point];
-       i < problem_.point_begin[point + 1]; ++i) {
+  for (const int64_t i : problem_.OfPoint(point)) {
     const Observation& observation = problem_.observations[i];
     AffineRow(cameras_[observation.view], observation, row);
     writer->Add(row);

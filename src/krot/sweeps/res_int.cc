@@ -11,23 +11,13 @@
 namespace krot::internal {
 namespace {
 
-// The goal of blocks in coarse sweeps; see res_int.h. With a tolerance of 1e-2
-// throughout, alternation would end at a higher cost (docs/history/journal.md,
-// "Res-Int, the first ten sweeps").
-constexpr double kCoarseShareOfGain = 0.1;
-constexpr double kFinestCoarse = 1e-3;
-constexpr double kCoarsest = 1e-2;
-constexpr double kCoarseLevel = 0.5;
-
-// `gain` is the relative decrease of the cost by the last sweep.
+// The goal of blocks in coarse sweeps; see res_int.h. `gain` is the relative
+// decrease of the cost by the last sweep. With a tolerance of 1e-2 throughout,
+// alternation would end at a higher cost (docs/history/journal.md, "Res-Int,
+// the first ten sweeps").
 DescentGoal CoarseGoal(double gain, double cost) {
-  return {std::clamp(kCoarseShareOfGain * gain, kFinestCoarse, kCoarsest),
-          kCoarseLevel * cost};
+  return {std::clamp(0.1 * gain, 1e-3, 1e-2), cost / 2};
 }
-
-// An extrapolation that makes a depth not positive is halved at most this many
-// times.
-constexpr int kMaxHalvings = 4;
 
 // Nesterov's momentum with restarts [Nesterov 1983; O'Donoghue, Candes 2015]:
 // every sweep starts a little further along the last improvement. A sweep that
@@ -51,7 +41,7 @@ class Momentum {
   Estimate NextStart() {
     if (improvements_ == 0) return best_;
     double beta = improvements_ / (improvements_ + 3.0);
-    for (int halving = 0; halving < kMaxHalvings; ++halving, beta /= 2) {
+    for (int halving = 0; halving < 4; ++halving, beta /= 2) {
       Estimate start = Between(best_, previous_, -beta);
       if (AllRanks(context_,
                    AllDepthsPositive(problem_, start, context_.num_threads))) {
@@ -111,7 +101,7 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
   CheckArgument(std::isfinite(summary.cost_initial), "cost of the start",
                 summary.cost_initial, "finite: all depths positive");
 
-  summary.termination = ResIntTermination::kMaxSweeps;
+  summary.termination = SolveTermination::kMaxSweeps;
   BlockSweep blocks(problem, options.fast_descent, options.norm, context);
   Momentum momentum(problem, context, *estimate, summary.cost_initial);
   bool is_coarse = !literal && options.update_frames;
@@ -127,7 +117,7 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
     double reached = blocks.IntersectPoints(&current);
     if (options.update_frames) reached = blocks.ResectFrames(&current);
     if (context.IsCancelled()) {
-      summary.termination = ResIntTermination::kInterrupted;
+      summary.termination = SolveTermination::kInterrupted;
       break;
     }
     const double cost_before = momentum.best_cost();
@@ -143,7 +133,7 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
       idle_sweeps = 0;
     }
     if (idle_sweeps == patience || cost == 0) {
-      summary.termination = ResIntTermination::kStalled;
+      summary.termination = SolveTermination::kStalled;
       break;
     }
   }

@@ -10,6 +10,7 @@
 #include "krot/minimax/fast_descent.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/solve.h"
 
 namespace krot::internal {
 
@@ -149,15 +150,10 @@ struct ResIntOptions {
   std::function<void(int sweep, const Sweep&)> callback;
 };
 
-enum class ResIntTermination {
-  kNotRun,
-  kStalled,  // sweeps lower the cost by less than the tolerance
-  kMaxSweeps,
-  kInterrupted,
-};
-
 struct ResIntSummary {
-  ResIntTermination termination = ResIntTermination::kNotRun;
+  // kStalled: sweeps lower the cost by less than the tolerance; kMaxSweeps or
+  // kInterrupted.
+  SolveTermination termination = SolveTermination::kNotRun;
   double cost_initial = 0;  // pixels
   double cost_final = 0;    // <= cost_initial
   std::vector<Sweep> sweeps;

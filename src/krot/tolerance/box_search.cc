@@ -11,15 +11,6 @@
 namespace krot::internal {
 namespace {
 
-// The working set begins with so many ties of every frame
-// (WorkingSet::AddTies), and takes twice as many until it is connected.
-constexpr int kFirstTies = 20;
-// A round adds at most so many times the points that the set has.
-constexpr int kGrowth = 2;
-constexpr int kMaxRounds = 12;
-// Bisection along the segment from the centre ends with this share of it.
-constexpr double kSegmentStep = 1.0 / 1024;
-
 // The same pulls in a part of the problem; none if it lacks one of them.
 std::optional<Pulls> AllInPart(const ProblemSubset& part, const Pulls& pulls) {
   Pulls in_part;
@@ -111,11 +102,11 @@ class EndSearch {
         break;
       }
       if (set_.IsAll()) break;
-      if (round == kMaxRounds) {
+      if (round == 12) {
         set_.AddAll();
       } else if (set_.AddAbove(of_usable, shared_.norm(),
                                (1 + kErrorRounding) * shared_.bound(),
-                               kGrowth * set_.num_points()) == 0) {
+                               2 * set_.num_points()) == 0) {
         break;
       }
     }
@@ -182,7 +173,7 @@ class EndSearch {
     };
     if (is_allowed(far_end)) return far_end;
     double allowed = 0;
-    for (double step = 0.5; step >= kSegmentStep; step /= 2) {
+    for (double step = 0.5; step >= 1.0 / 1024; step /= 2) {
       if (is_allowed(Between(shared_.centre(), far_end, allowed + step))) {
         allowed += step;
       }
@@ -198,7 +189,7 @@ class EndSearch {
   const Reprojection reprojection_;
   WorkingSet set_;      // of the usable part
   WorkingSet usables_;  // all points of the usable part, in the whole
-  int num_ties_ = kFirstTies;
+  int num_ties_ = 20;   // of every frame; doubled until it is connected
   int64_t num_programmes_ = 0;
 };
 

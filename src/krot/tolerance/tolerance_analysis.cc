@@ -1,6 +1,7 @@
 #include "krot/tolerance/tolerance_analysis.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -11,11 +12,15 @@
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/model/derived_models.h"
+#include "krot/model/known_distances.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 
 namespace krot::internal {
+namespace {
 
+// The inverse of a list of indices in the model: for each of its `count`
+// elements the index in the list, or -1.
 std::vector<int32_t> InverseOf(const std::vector<int32_t>& of, size_t count) {
   std::vector<int32_t> inverse(count, -1);
   for (size_t n = 0; n < of.size(); ++n) {
@@ -24,19 +29,14 @@ std::vector<int32_t> InverseOf(const std::vector<int32_t>& of, size_t count) {
   return inverse;
 }
 
-namespace {
-
-// The model is solved first unless its largest error is at most this share of
-// the bound.
-constexpr double kFitShare = 0.95;
-
 double TrueCostOf(const Model& model, const BuiltProblem& built, Norm norm,
                   const Context& context) {
   return Reprojection(model, built)
       .TrueCost(built.start, norm, context.num_threads);
 }
 
-// Finds an estimate within the bound; returns false if none was found.
+// Finds an estimate within the bound; returns false if none was found. The
+// model is solved first unless all its errors are well within.
 bool FindModel(const ToleranceOptions& options, const Context& context,
                BuiltProblem* built, ToleranceResult* result) {
   ToleranceSummary& summary = result->summary;
@@ -44,7 +44,7 @@ bool FindModel(const ToleranceOptions& options, const Context& context,
   *built = BuildProblem(result->model, options.solve.problem);
   if (!built->problem.observations.empty()) {
     summary.cost = TrueCostOf(result->model, *built, norm, context);
-    if (summary.cost <= kFitShare * options.max_error) return true;
+    if (summary.cost <= 0.95 * options.max_error) return true;
   }
   SolveModelOptions solve = options.solve;
   solve.finish.finish = Finish::kNone;
@@ -84,56 +84,180 @@ ToleranceGauge GaugeFor(const ToleranceOptions& options,
   return gauge;
 }
 
-std::vector<ToleranceBox> EmptyBoxes(const Model& model,
-                                     const ToleranceOptions& options) {
-  std::vector<ToleranceBox> boxes;
-  for (const int32_t i : options.images) {
-    ToleranceBox box;
-    box.is_image = true;
-    box.id = model.images[i].id;
-    box.name = model.images[i].name;
-    boxes.push_back(std::move(box));
-  }
-  for (const int32_t k : options.points) {
-    ToleranceBox box;
-    box.id = model.points3D[k].id;
-    box.position = model.points3D[k].xyz;
-    boxes.push_back(std::move(box));
-  }
-  return boxes;
-}
-
 void FillBoxes(const ToleranceOptions& options, const ToleranceProblem& problem,
                const std::vector<int32_t>& view_of, const Context& context,
                ToleranceSummary* summary) {
+  const Model& model = problem.model();
   const std::vector<int32_t> point_of =
-      InverseOf(problem.built().point_of, problem.model().points3D.size());
-  const auto num_boxes = static_cast<int64_t>(summary->boxes.size());
+      InverseOf(problem.built().point_of, model.points3D.size());
+  const size_t num_images = options.images.size();
+  const size_t num_boxes = num_images + options.points.size();
+  summary->boxes.resize(num_boxes);
   Context inner = context;
   if (num_boxes > 1) inner.num_threads = 1;
   std::atomic<int64_t> num_done = static_cast<int64_t>(summary->lengths.size());
-  ParallelFor(num_boxes, 1, context.num_threads, [&](int64_t n, int64_t, int) {
-    if (context.IsCancelled()) return;
+  const auto fill = [&](size_t n) {
     ToleranceBox& box = summary->boxes[n];
-    const auto num_images = static_cast<int64_t>(options.images.size());
-    const int32_t index = box.is_image
-                              ? view_of[options.images[n]]
-                              : point_of[options.points[n - num_images]];
-    box.is_free = index < 0;
+    Pull target;
+    box.is_image = n < num_images;
+    if (box.is_image) {
+      const int32_t i = options.images[n];
+      box.id = model.images[i].id;
+      box.name = model.images[i].name;
+      target = {Pull::Kind::kView, view_of[i]};
+    } else {
+      const int32_t k = options.points[n - num_images];
+      box.id = model.points3D[k].id;
+      box.position = model.points3D[k].xyz;
+      target = {Pull::Kind::kPoint, point_of[k]};
+    }
+    if (context.IsCancelled()) return;
+    box.is_free = target.index < 0;
     if (!box.is_free) {
-      const Pull target{box.is_image ? Pull::Kind::kView : Pull::Kind::kPoint,
-                        index};
       box.position = PositionOf(problem.problem(), problem.centre(), target);
       box.is_free = !IsFixedPosition(problem.problem(), target) &&
                     !problem.UsablePart({target});
       box.box = FindBox(problem, target, options.tolerance, inner);
     }
     if (options.on_box) options.on_box(++num_done);
-  });
+  };
+  ParallelFor(static_cast<int64_t>(num_boxes), 1, context.num_threads,
+              [&](int64_t n, int64_t, int) { fill(n); });
   for (const ToleranceBox& box : summary->boxes) {
     summary->num_programmes += box.box.num_programmes;
   }
 }
+
+// Finds the least and the greatest length of distances, by a problem of their
+// own: its gauge is the scale bar, if there is one and the scale is free.
+class LengthFinder {
+ public:
+  LengthFinder(const ToleranceOptions& options, const ToleranceGauge& gauge,
+               const BuiltProblem& built, const Context& context)
+      : options_(options), context_(context), gauge_(gauge), built_(built) {}
+
+  // Fills in summary->lengths, around the estimate that `built` starts from.
+  void Fill(const Model& model, ToleranceSummary* summary) {
+    std::vector<ToleranceLength>& lengths = summary->lengths;
+    const std::vector<double> in_model = LengthsOf(model, options_.distances);
+    view_of_ = InverseOf(built_.image_of, model.images.size());
+    point_of_ = InverseOf(built_.point_of, model.points3D.size());
+    for (size_t n = 0; n < options_.distances.size(); ++n) {
+      const KnownDistance& distance = options_.distances[n];
+      ToleranceLength length;
+      length.name = distance.Name(model);
+      length.metres = distance.metres;
+      length.tolerance = distance.tolerance;
+      length.length = in_model[n];
+      length.is_free = true;
+      lengths.push_back(std::move(length));
+      targets_.push_back(TargetsOf(distance));
+      if (!bar_ && distance.metres) bar_ = n;
+    }
+    if (bar_) lengths[*bar_].is_bar = true;
+    if (bar_ && !targets_[*bar_]) return;
+    if (bar_ && gauge_.first && IsScaleFree(built_.problem)) {
+      gauge_ = {(*targets_[*bar_])[0], (*targets_[*bar_])[1]};
+    }
+    const Estimate centre = built_.start;
+    const ToleranceProblem problem(model, &built_, centre, gauge_,
+                                   options_.solve.norm, options_.max_error,
+                                   context_);
+    if (bar_) {
+      const LengthRange range = Find(problem, *bar_, context_, summary);
+      unit_ = BarUnit{in_model[*bar_], range};
+    }
+    FillOthers(problem, summary);
+  }
+
+ private:
+  // What lengths are divided by to get metres.
+  struct BarUnit {
+    double in_model = 0;
+    LengthRange range;
+  };
+
+  std::optional<std::array<Pull, 2>> TargetsOf(
+      const KnownDistance& distance) const {
+    std::array<Pull, 2> targets;
+    for (int side = 0; side < 2; ++side) {
+      const KnownDistance::End& end = distance.ends[side];
+      const int32_t index = (end.is_image ? view_of_ : point_of_)[end.index];
+      if (index < 0) return std::nullopt;
+      targets[side] = {end.is_image ? Pull::Kind::kView : Pull::Kind::kPoint,
+                       index};
+    }
+    return targets;
+  }
+
+  LengthRange Find(const ToleranceProblem& problem, size_t n,
+                   const Context& context, ToleranceSummary* summary) {
+    LengthRange range =
+        FindLength(problem, *targets_[n],
+                   bar_ && n != *bar_ ? targets_[*bar_] : std::nullopt,
+                   options_.tolerance, context);
+    summary->lengths[n].is_free = !range.low.proved;
+    return range;
+  }
+
+  void FillOthers(const ToleranceProblem& problem, ToleranceSummary* summary) {
+    std::vector<ToleranceLength>& lengths = summary->lengths;
+    Context inner = context_;
+    if (lengths.size() > 1) inner.num_threads = 1;
+    std::vector<int64_t> num_programmes(lengths.size(), 0);
+    std::atomic<int64_t> num_done = 0;
+    ParallelFor(static_cast<int64_t>(lengths.size()), 1, context_.num_threads,
+                [&](int64_t n, int64_t, int) {
+                  const bool is_bar = bar_ && static_cast<size_t>(n) == *bar_;
+                  if (context_.IsCancelled() || !targets_[n]) return;
+                  const LengthRange range =
+                      is_bar ? unit_->range : Find(problem, n, inner, summary);
+                  num_programmes[n] = range.num_programmes;
+                  InMetres(range, &lengths[n]);
+                  if (options_.on_box) options_.on_box(++num_done);
+                });
+    for (const int64_t count : num_programmes) summary->num_programmes += count;
+  }
+
+  // Converts a range to metres, each end by the bar's least favourable length.
+  void InMetres(const LengthRange& range, ToleranceLength* length) const {
+    length->low = range.low;
+    length->high = range.high;
+    if (!bar_) return;
+    constexpr double kOutwards = 4 * std::numeric_limits<double>::epsilon();
+    const KnownDistance& bar = options_.distances[*bar_];
+    const double least = std::max(*bar.metres - bar.tolerance, 0.0);
+    const double most = *bar.metres + bar.tolerance;
+    length->length *= *bar.metres / unit_->in_model;
+    length->low.reached *= least / unit_->in_model;
+    length->high.reached *= most / unit_->in_model;
+    const BoxEnd& low_of_bar = unit_->range.low;
+    const BoxEnd& high_of_bar = unit_->range.high;
+    if (length->is_bar) {
+      length->low = {least, least};
+      length->high = {most, most};
+      return;
+    }
+    if (!length->low.proved || !high_of_bar.proved ||
+        !(*low_of_bar.proved > 0)) {
+      length->low.proved = length->high.proved = std::nullopt;
+      length->is_free = true;
+      return;
+    }
+    *length->low.proved *= least / *high_of_bar.proved * (1 - kOutwards);
+    *length->high.proved *= most / *low_of_bar.proved * (1 + kOutwards);
+  }
+
+  const ToleranceOptions& options_;
+  const Context& context_;
+  ToleranceGauge gauge_;
+  BuiltProblem built_;
+  std::vector<int32_t> view_of_;
+  std::vector<int32_t> point_of_;
+  std::vector<std::optional<std::array<Pull, 2>>> targets_;
+  std::optional<size_t> bar_;
+  std::optional<BarUnit> unit_;
+};
 
 EndAgreement Compare(const std::vector<ToleranceBox>& boxes) {
   EndAgreement agreement;
@@ -195,13 +319,12 @@ ToleranceResult AnalyzeInFrame(const Model& model,
   if (options.on_box) options.on_box(0);
   const Estimate centre = built.start;
   if (!options.distances.empty()) {
-    FillLengths(options, result.model, gauge, built, context, &summary);
+    LengthFinder(options, gauge, built, context).Fill(result.model, &summary);
   }
   const ToleranceProblem shared(result.model, &built, centre, gauge,
                                 options.solve.norm, options.max_error, context);
   summary.num_rowless = shared.num_rowless();
   summary.num_far_points = shared.num_far_points();
-  summary.boxes = EmptyBoxes(result.model, options);
   FillBoxes(options, shared, view_of, context, &summary);
   summary.agreement = Compare(summary.boxes);
   summary.termination = context.IsCancelled()

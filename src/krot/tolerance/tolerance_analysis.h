@@ -45,14 +45,12 @@ struct ExtentOptions {
   Norm norm;                // p = 1, 2 or infinity
   double bound = 0;         // of all residuals, pixels; > 0
   double tolerance = 0.01;  // of the way from the start to the proved end; > 0
-  int max_iterations = 100;
 };
 
 // How far estimates reach whose residuals are all below the bound.
 struct Extent {
   Estimate estimate;             // that reaches the farthest
   std::optional<double> proved;  // bounds the sum (CheckExtent); scene units
-  int iterations = 0;
 };
 
 // Maximises the sum of p'x over `pulls` from `start`, which must be below the
@@ -249,17 +247,6 @@ struct ToleranceSummary {
   EndAgreement agreement;
   double seconds = 0;
 };
-
-// The inverse of a list of indices in the model: for each of its `count`
-// elements the index in the list, or -1.
-std::vector<int32_t> InverseOf(const std::vector<int32_t>& of, size_t count);
-
-// Fills in summary->lengths, around the estimate that `built` starts from.
-// Lengths have a problem of their own: its gauge is the scale bar, if there is
-// one and the scale is free, and otherwise `gauge`.
-void FillLengths(const ToleranceOptions& options, const Model& model,
-                 const ToleranceGauge& gauge, const BuiltProblem& built,
-                 const Context& context, ToleranceSummary* summary);
 
 struct ToleranceResult {
   Model model;  // the input, or the solved one; the boxes are around it

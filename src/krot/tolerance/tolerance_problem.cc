@@ -15,13 +15,6 @@
 namespace krot::internal {
 namespace {
 
-// If p'x grows by more than so many times the size of the scene, there is no
-// end to find.
-constexpr double kFarAway = 1e4;
-// A proof is tried once the gap is below so many times the tolerance: later
-// ones, with a smaller gap, may fail.
-constexpr double kFirstProof = 20;
-
 // The upper bound of the sum that the multipliers prove, if any.
 std::optional<double> Prove(const KnownRotationProblem& problem,
                             const Pulls& pulls,
@@ -83,15 +76,17 @@ Extent FindExtent(const KnownRotationProblem& problem, const Pulls& pulls,
   objective.h.Add(-1, CoefficientsOf(problem, pulls));
   if (scale) objective.e = CoefficientsOf(problem, {*scale});
   const double at_start = Along(problem, start, pulls);
-  const double far_away = kFarAway * SizeOf(problem, start, pulls.front());
+  // Beyond so many times the size of the scene there is no end to find.
+  const double far_away = 1e4 * SizeOf(problem, start, pulls.front());
 
   InteriorPointOptions interior_point;
   interior_point.norm = options.norm;
-  interior_point.max_iterations = options.max_iterations;
+  interior_point.max_iterations = 100;
   interior_point.stop = [&](const ConicIterate& iterate) {
     const double reached = Along(problem, *iterate.estimate, pulls);
     if (reached - at_start > far_away) return true;
-    if (iterate.gap > kFirstProof * options.tolerance) return false;
+    // Proofs are tried early: later ones, with a smaller gap, may fail.
+    if (iterate.gap > 20 * options.tolerance) return false;
     const std::optional<double> proved =
         Prove(problem, pulls, scale, options, start, *iterate.multipliers);
     if (!proved) return false;
@@ -100,10 +95,8 @@ Extent FindExtent(const KnownRotationProblem& problem, const Pulls& pulls,
            options.tolerance * (*extent.proved - at_start);
   };
   std::vector<Multiplier> multipliers;
-  extent.iterations =
-      MinimizeLinear(problem, interior_point, context, options.bound, objective,
-                     &extent.estimate, &multipliers)
-          .iterations;
+  MinimizeLinear(problem, interior_point, context, options.bound, objective,
+                 &extent.estimate, &multipliers);
   return extent;
 }
 
@@ -178,8 +171,7 @@ std::vector<char> FindFarPoints(const KnownRotationProblem& problem, Norm norm,
   std::vector<int64_t> undecided;
   for (int32_t k = 0; k < problem.num_points; ++k) {
     if (cost(k) < bound || !std::isfinite(cost(k))) continue;
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
+    for (const int64_t i : problem.OfPoint(k)) {
       undecided.push_back(i);
     }
   }

@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "krot/outliers/parts.h"
+#include "krot/outliers/robust_start.h"
 #include "krot/problem/cost.h"
 
 namespace krot::internal {
@@ -17,10 +21,151 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Shares of the excess that companions may use up; below 1, as the chart is
-// only approximate.
-constexpr double kUse[] = {0.97, 0.8};
-constexpr size_t kMaxCandidates = 4;
+// The centre of the camera of observation i.
+Vector3d CentreOf(const KnownRotationProblem& problem, const Estimate& estimate,
+                  int64_t i) {
+  const View& view = problem.views[problem.observations[i].view];
+  const AffineMap map = CamFromWorld(view, estimate.translations[view.frame]);
+  return -map.leftCols<3>().transpose() * map.col(3);
+}
+
+}  // namespace
+
+Neighbourhoods::Neighbourhoods(const KnownRotationProblem& problem,
+                               const Estimate& estimate)
+    : problem_(problem),
+      estimate_(estimate),
+      points_of_frame_(problem.num_frames) {
+  for (int32_t f = 0; f < problem_.num_frames; ++f) {
+    for (const int32_t i : problem_.OfFrame(f)) {
+      const int32_t k = problem_.observations[i].point;
+      std::vector<int32_t>& points = points_of_frame_[f];
+      if (points.empty() || points.back() != k) points.push_back(k);
+    }
+  }
+}
+
+// The strain of two rays, about: their epipolar error in pixels.
+double Neighbourhoods::Strain(int64_t i, int64_t j) const {
+  const Vector3d baseline =
+      CentreOf(problem_, estimate_, j) - CentreOf(problem_, estimate_, i);
+  const Vector3d normal = baseline.cross(DirectionOf(problem_, i));
+  const double length = normal.norm();
+  if (!(length > 0)) return 0;
+  const double angle = std::abs(normal.dot(DirectionOf(problem_, j))) / length;
+  return angle * problem_.observations[j].E.bottomRows<2>().norm();
+}
+
+// Appends the most strained points of which both frames have free observations.
+void Neighbourhoods::AddStrained(int32_t a, int32_t b,
+                                 const std::vector<char>& is_free,
+                                 std::vector<int32_t>* points) const {
+  std::vector<int32_t> common;
+  std::set_intersection(points_of_frame_[a].begin(), points_of_frame_[a].end(),
+                        points_of_frame_[b].begin(), points_of_frame_[b].end(),
+                        std::back_inserter(common));
+  std::vector<std::pair<double, int32_t>> strained;  // -strain, point
+  for (const int32_t k : common) {
+    int64_t in_a = -1;
+    int64_t in_b = -1;
+    for (const int64_t i : problem_.OfPoint(k)) {
+      if (!is_free[i]) continue;
+      if (problem_.FrameOf(i) == a) in_a = i;
+      if (problem_.FrameOf(i) == b) in_b = i;
+    }
+    if (in_a >= 0 && in_b >= 0) strained.emplace_back(-Strain(in_a, in_b), k);
+  }
+  const size_t count = std::min<size_t>(strained.size(), 64);
+  std::partial_sort(strained.begin(),
+                    strained.begin() + static_cast<std::ptrdiff_t>(count),
+                    strained.end());
+  for (size_t n = 0; n < count; ++n) points->push_back(strained[n].second);
+}
+
+std::vector<int64_t> Neighbourhoods::Around(
+    int64_t i, std::vector<int32_t> frames,
+    const std::vector<char>& is_free) const {
+  frames.push_back(problem_.FrameOf(i));
+  SortUnique(&frames);
+  std::vector<int32_t> points = {problem_.observations[i].point};
+  for (size_t n = 0; n < frames.size(); ++n) {
+    for (size_t m = 0; m < n; ++m)
+      AddStrained(frames[m], frames[n], is_free, &points);
+  }
+  SortUnique(&points);
+  std::vector<int64_t> observations;
+  for (const int32_t k : points) {
+    for (const int64_t j : problem_.OfPoint(k)) {
+      const bool is_there =
+          std::binary_search(frames.begin(), frames.end(), problem_.FrameOf(j));
+      if (j == i || (is_free[j] && is_there)) observations.push_back(j);
+    }
+  }
+  return observations;
+}
+
+std::vector<std::vector<int32_t>> Neighbourhoods::FrameSets(
+    int64_t i, int num_others, const std::vector<char>& is_free) const {
+  const int32_t k = problem_.observations[i].point;
+  std::vector<std::pair<double, int32_t>> strained;  // -strain, frame
+  for (const int64_t j : problem_.OfPoint(k)) {
+    if (is_free[j] && j != i)
+      strained.emplace_back(-Strain(i, j), problem_.FrameOf(j));
+  }
+  std::sort(strained.begin(), strained.end());
+  std::vector<int32_t> others;
+  for (const auto& [strain, frame] : strained) {
+    if (std::find(others.begin(), others.end(), frame) == others.end()) {
+      others.push_back(frame);
+    }
+  }
+  if (others.size() > 8) others.resize(8);
+  std::vector<std::vector<int32_t>> sets;
+  if (num_others == 2) {
+    for (size_t n = 0; n < std::min<size_t>(others.size(), 4); ++n) {
+      for (size_t m = 0; m < n; ++m) sets.push_back({others[m], others[n]});
+    }
+  } else if (others.size() > 2) {
+    sets.push_back(others);
+  }
+  return sets;
+}
+
+std::vector<float> Worths(const KnownRotationProblem& problem,
+                          const std::vector<char>& is_free,
+                          const std::vector<int64_t>& open) {
+  std::vector<float> worth(is_free.begin(), is_free.end());
+  for (const int64_t i : open) {
+    const int32_t k = problem.observations[i].point;
+    const int64_t begin = problem.point_begin[k];
+    const int64_t end = problem.point_begin[k + 1];
+    if (std::count(&is_free[0] + begin, &is_free[0] + end, 1) > 2) continue;
+    for (int64_t j = begin; j < end; ++j) {
+      if (is_free[j]) worth[j] = 0.3F;  // others of its track need it
+    }
+  }
+  return worth;
+}
+
+std::vector<int64_t> TakeCrowded(const KnownRotationProblem& problem,
+                                 const std::vector<char>& is_free,
+                                 std::vector<int64_t>* open) {
+  std::vector<int64_t> spare(problem.views.size(), 0);
+  for (size_t i = 0; i < is_free.size(); ++i) {
+    spare[problem.observations[i].view] += is_free[i];
+  }
+  const auto view_of = [&](int64_t i) { return problem.observations[i].view; };
+  for (const int64_t i : *open) spare[view_of(i)] -= 2;
+  std::vector<int64_t> crowded;
+  std::vector<int64_t> others;
+  std::partition_copy(open->begin(), open->end(), std::back_inserter(crowded),
+                      std::back_inserter(others),
+                      [&](int64_t i) { return spare[view_of(i)] < 0; });
+  *open = std::move(others);
+  return crowded;
+}
+
+namespace {
 
 // The cone of rays within a bound, in the world, at depth 1: { x = d + P y :
 // ||y|| <= 1 }.
@@ -70,12 +215,6 @@ TwoViewConflicts::TwoViewConflicts(const KnownRotationProblem& problem,
   }
 }
 
-Vector3d TwoViewConflicts::CentreOf(int64_t i) const {
-  const View& view = problem_.views[problem_.observations[i].view];
-  const AffineMap map = CamFromWorld(view, estimate_.translations[view.frame]);
-  return -map.leftCols<3>().transpose() * map.col(3);
-}
-
 // Appends both edges of the band of baselines from the view of i to that of j.
 // False if their cones meet, or if e is not between them.
 bool TwoViewConflicts::AppendBand(int64_t i, int64_t j, const Vector3d& e,
@@ -121,7 +260,9 @@ void TwoViewConflicts::AppendTriples(const HalfPlane& violated,
                                      const std::vector<HalfPlane>& planes,
                                      float worth,
                                      std::vector<Candidate>* candidates) const {
-  for (const double use : kUse) {
+  // Shares of the excess that companions may use up; below 1, as the chart is
+  // only approximate.
+  for (const double use : {0.97, 0.8}) {
     const double m = -use * violated.slack;
     std::array<double, 2> least;
     least.fill(std::numeric_limits<double>::infinity());
@@ -145,9 +286,7 @@ void TwoViewConflicts::AppendTriples(const HalfPlane& violated,
                                       own->observations.begin(),
                                       own->observations.end());
       }
-      std::vector<int64_t>& all = candidate.observations;
-      std::sort(all.begin(), all.end());
-      all.erase(std::unique(all.begin(), all.end()), all.end());
+      SortUnique(&candidate.observations);
       candidates->push_back(std::move(candidate));
       break;
     }
@@ -158,11 +297,11 @@ std::vector<std::vector<int64_t>> TwoViewConflicts::Candidates(
     int64_t i, const std::vector<float>& worth) const {
   const Observation& own = problem_.observations[i];
   std::vector<Candidate> candidates;
-  for (int64_t j = problem_.point_begin[own.point];
-       j < problem_.point_begin[own.point + 1]; ++j) {
+  for (const int64_t j : problem_.OfPoint(own.point)) {
     const Observation& other = problem_.observations[j];
     if (j == i || !(worth[j] > 0) || other.view == own.view) continue;
-    const Vector3d baseline = CentreOf(j) - CentreOf(i);
+    const Vector3d baseline =
+        CentreOf(problem_, estimate_, j) - CentreOf(problem_, estimate_, i);
     if (!(baseline.norm() > 0)) continue;
     const Vector3d e = baseline.normalized();
     std::vector<HalfPlane> edges;
@@ -201,7 +340,7 @@ std::vector<std::vector<int64_t>> TwoViewConflicts::Candidates(
       [](const Candidate& a, const Candidate& b) { return a.ease > b.ease; });
   std::vector<std::vector<int64_t>> sets;
   for (Candidate& candidate : candidates) {
-    if (sets.size() == kMaxCandidates) break;
+    if (sets.size() == 4) break;
     sets.push_back(std::move(candidate.observations));
   }
   return sets;

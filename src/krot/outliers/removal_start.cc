@@ -1,0 +1,234 @@
+#include "krot/outliers/outlier_filter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <utility>
+
+#include "krot/analysis/noise.h"
+#include "krot/base/check.h"
+#include "krot/convert/reprojection.h"
+#include "krot/finish/least_squares.h"
+#include "krot/outliers/packing.h"
+#include "krot/outliers/removal.h"
+#include "krot/outliers/robust_start.h"
+#include "krot/pipeline/stages.h"
+
+namespace krot::internal {
+namespace {
+
+constexpr int kNumLevels = 6;  // about, below the first
+
+class Profiler {
+ public:
+  Profiler(const Model& model, const BuiltProblem& built,
+           const ErrorProfileOptions& options, const Context& context)
+      : model_(model),
+        built_(built),
+        options_(options),
+        context_(context),
+        search_(model, built, options.norm, context) {
+    profile_.noise = FindNoiseLimit(model, built, options.norm, context);
+  }
+
+  ErrorProfile Run() {
+    Removal nothing;
+    nothing.estimate = built_.start;
+    const auto at_level = [this](int n) {
+      return context_.Within("error profile, level " + std::to_string(n) +
+                             " of about " + std::to_string(kNumLevels));
+    };
+    profile_.levels.push_back(Solve(std::move(nothing), at_level(0)));
+    const double first = profile_.levels[0].max_error;
+    const double noise = profile_.noise.max_error;
+    const bool has_outliers = profile_.levels[0].lower_bound > noise;
+    const double last = options_.max_error.value_or(
+        has_outliers ? std::min(noise, first / 2) : first / 2);
+    for (int n = 0; !context_.IsCancelled(); ++n) {
+      const double now = profile_.levels.back().max_error;
+      if (!(now > last) || !std::isfinite(now)) break;
+      const double steps = std::max(1, kNumLevels - n);
+      double bound = std::max(last, now * std::pow(last / now, 1 / steps));
+      if (noise < now) bound = std::max(bound, noise);
+      // A few programmes are enough where the last level's weights are at hand.
+      ProfileLevel level =
+          Solve(search_.Find(bound, /*max_programmes=*/n == 0 ? 4 : 2),
+                at_level(n + 1));
+      if (context_.IsCancelled() || !(level.max_error < now)) break;
+      Charge(&level);
+      Append(std::move(level));
+    }
+    for (size_t n = 1; has_outliers && n < profile_.levels.size(); ++n) {
+      if (profile_.levels[n].max_error > noise) continue;
+      profile_.elbow = n;
+      break;
+    }
+    return std::move(profile_);
+  }
+
+ private:
+  // The optimum of what a removal leaves.
+  ProfileLevel Solve(Removal removal, const Context& context) const {
+    OptimumWithout optimum =
+        SolveWithout(model_, built_, removal.observations, removal.estimate,
+                     options_.norm, context);
+    ProfileLevel level;
+    level.removal = std::move(removal);
+    level.removal.estimate = std::move(optimum.estimate);
+    level.max_error = optimum.max_error;
+    level.lower_bound = optimum.lower_bound;
+    level.proof = std::move(optimum.proof);
+    return level;
+  }
+
+  void Charge(ProfileLevel* level) {
+    if (level->removal.observations.size() <= 50) {
+      profile_.conflicts =
+          PackAgainstRemoval(model_, built_, {options_.norm, level->max_error},
+                             level->removal, std::move(profile_.conflicts),
+                             context_)
+              .conflicts;
+    }
+    level->num_proved = static_cast<int64_t>(profile_.conflicts.size());
+  }
+
+  // Appends a level; earlier ones that removed no fewer observations are
+  // dropped.
+  void Append(ProfileLevel level) {
+    std::vector<ProfileLevel>& levels = profile_.levels;
+    while (levels.size() > 1 && levels.back().removal.observations.size() >=
+                                    level.removal.observations.size()) {
+      levels.pop_back();
+    }
+    levels.push_back(std::move(level));
+  }
+
+  const Model& model_;
+  const BuiltProblem& built_;
+  const ErrorProfileOptions& options_;
+  const Context& context_;
+  RemovalSearch search_;
+  ErrorProfile profile_;
+};
+
+NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
+  NoiseLimit limit;
+  limit.max_error = kLeastNoisePx;
+  const ModelNoise noise = SnoopNoise(model, {}, context).noise;
+  if (!noise.sigma_px) return limit;
+  limit.sigma = *noise.sigma_px;
+  // ||e||_1 <= sqrt(2) ||e||_2.
+  const double factor = norm.p == 1 ? std::sqrt(2.0) : 1;
+  const auto count = static_cast<double>(noise.num_tested);
+  limit.max_error =
+      std::max(kLeastNoisePx,
+               factor * limit.sigma * std::sqrt(2 * std::log(count / 0.05)));
+  return limit;
+}
+
+}  // namespace
+
+NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
+                          Norm norm, const Context& context) {
+  const NoiseLimit own = LimitOf(model, norm, context);
+  context.Stage("measuring the noise");
+  Estimate robust = FindRobustStart(
+      built.problem, norm, std::min(kLevelOfStart, own.max_error), context);
+  MinimizeRobustly(built.problem, context, &robust);
+  const NoiseLimit limit =
+      LimitOf(ApplyEstimate(model, built, robust), norm, context);
+  const bool is_lower = limit.sigma > 0 && !(limit.sigma >= own.sigma);
+  return is_lower || own.sigma == 0 ? limit : own;
+}
+
+ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,
+                              const ErrorProfileOptions& options,
+                              const Context& context) {
+  CheckArgument(!options.max_error || *options.max_error > 0, "max_error",
+                options.max_error.value_or(0), "> 0");
+  return Profiler(model, built, options, context).Run();
+}
+
+namespace {
+
+std::string Pixels(double value) {
+  std::ostringstream words;
+  words.precision(3);
+  words << value << " px";
+  return words.str();
+}
+
+// Starts from nothing; errors above `level` count as wrong.
+void PlaceFromTracks(Norm norm, double level, const Context& context,
+                     RemovalStart* start) {
+  start->init = SolveInit::kFeasible;
+  const KnownRotationProblem& problem = start->built.problem;
+  start->built.start = FindRobustStart(problem, norm, level, context);
+  MinimizeRobustly(problem, context, &start->built.start);
+  context.Note("positions from rotations and tracks: the median error is " +
+               Pixels(MedianError(problem, start->built.start, norm)));
+}
+
+// Whether the model has positions at which noise explains half of its errors
+// and none is gross.
+bool FitsItsPositions(const Model& model, const OutlierFilterOptions& options,
+                      const Context& context, double explained) {
+  BuildProblemOptions build = options.solve.problem;
+  build.num_threads = context.num_threads;
+  const BuiltProblem own = BuildProblem(model, build);
+  const Norm norm = options.solve.norm;
+  return HasOwnStart(own) &&
+         MedianError(own.problem, own.start, norm) <= explained &&
+         Reprojection(model, own)
+                 .TrueCost(own.start, norm, context.num_threads) <=
+             options.solve.init_max_error;
+}
+
+}  // namespace
+
+RemovalStart FindRemovalStart(const Model& model,
+                              const OutlierFilterOptions& options,
+                              const Context& context) {
+  BuildProblemOptions build = options.solve.problem;
+  build.num_threads = context.num_threads;
+  build.ignore_translations = options.solve.init == SolveInit::kFeasible;
+  RemovalStart start;
+  start.max_error = options.max_error.value_or(0);
+  start.built = BuildProblem(model, build);
+  if (!build.ignore_translations && !HasOwnStart(start.built)) {
+    build.ignore_translations = true;
+    start.built = BuildProblem(model, build);
+  }
+  const Norm norm = options.solve.norm;
+  if (build.ignore_translations) {
+    const double level = options.max_error.value_or(kLevelOfStart);
+    PlaceFromTracks(norm, std::min(kLevelOfStart, level), context, &start);
+  }
+  if (start.init == SolveInit::kFeasible && !options.max_error &&
+      !options.make_profile) {
+    const NoiseLimit noise = LimitOf(
+        ApplyEstimate(model, start.built, start.built.start), norm, context);
+    start.max_error = noise.max_error;
+    const double largest =
+        Reprojection(model, start.built)
+            .TrueCost(start.built.start, norm, context.num_threads);
+    // A start's errors are larger than the lowest maximum, so that these do not
+    // show that an observation has to go.
+    start.nearly_fits = largest <= 3 * start.max_error;
+    start.fits_its_positions =
+        !options.has_other_rotations &&
+        FitsItsPositions(model, options, context, start.max_error);
+    if (options.spares_what_fits &&
+        (start.nearly_fits || start.fits_its_positions)) {
+      return start;
+    }
+    context.Note("leaving out what noise of " + Pixels(noise.sigma) +
+                 " per axis does not explain: errors above " +
+                 Pixels(start.max_error));
+  }
+  if (options.has_start_from_nothing) start.init = SolveInit::kFeasible;
+  return start;
+}
+
+}  // namespace krot::internal
