@@ -184,7 +184,7 @@ TEST(Groups, ShareTheTracksThatFramesOfBothSee) {
       std::map<int32_t, std::set<int32_t>> seen;  // frames of each group
       for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
            ++i) {
-        const int32_t frame = FrameOf(problem, i);
+        const int32_t frame = problem.FrameOf(i);
         seen[group_of[frame]].insert(frame);
       }
       for (const auto& [a, frames] : seen) {

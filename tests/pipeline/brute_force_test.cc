@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
+#include "krot/base/numbers.h"
 #include "krot/convert/reprojection.h"
 #include "krot/pipeline/solve_model.h"
 #include "tests/convert/lens_model.h"
@@ -21,8 +22,6 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 class BruteForce {
  public:

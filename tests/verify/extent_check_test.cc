@@ -7,6 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "krot/verify/force_checker.h"
+
 namespace krot::internal {
 namespace {
 

@@ -141,7 +141,7 @@ void OptionTable::AddBool(const std::string& name, bool* value,
 }
 
 void OptionTable::AddInteger(const std::string& name, int* value,
-                             const Range<int>& range,
+                             const AllowedRange<int>& range,
                              const std::string& description) {
   Add({name, description, "an integer " + range.text, std::to_string(*value),
        false, [value, contains = range.contains](const std::string& text) {
@@ -150,7 +150,7 @@ void OptionTable::AddInteger(const std::string& name, int* value,
 }
 
 void OptionTable::AddReal(const std::string& name, double* value,
-                          const Range<double>& range,
+                          const AllowedRange<double>& range,
                           const std::string& description) {
   Add({name, description, "a number " + range.text, NumberText(*value), false,
        [value, contains = range.contains](const std::string& text) {

@@ -28,7 +28,7 @@ bool ParseBool(const std::string& text, bool* value);    // 0, 1, false, true
 // The range of a number. `text` completes "must be ..."; help, messages and
 // docs/cli.md all use it.
 template <typename Number>
-struct Range {
+struct AllowedRange {
   std::string text;
   std::function<bool(Number)> contains;
 };
@@ -43,23 +43,25 @@ std::string RangeText(const std::string& unit, const Parts&... parts) {
 }
 
 template <typename Number>
-Range<Number> AtLeast(Number min, const std::string& unit = "") {
+AllowedRange<Number> AtLeast(Number min, const std::string& unit = "") {
   return {RangeText(unit, ">= ", min),
           [min](Number value) { return value >= min; }};
 }
 template <typename Number>
-Range<Number> Above(Number min, const std::string& unit = "") {
+AllowedRange<Number> Above(Number min, const std::string& unit = "") {
   return {RangeText(unit, "> ", min),
           [min](Number value) { return value > min; }};
 }
 template <typename Number>
-Range<Number> Between(Number min, Number max, const std::string& unit = "") {
+AllowedRange<Number> Between(Number min, Number max,
+                             const std::string& unit = "") {
   return {RangeText(unit, "in [", min, ", ", max, "]"),
           [min, max](Number value) { return value >= min && value <= max; }};
 }
 // [min, max)
 template <typename Number>
-Range<Number> InHalfOpen(Number min, Number max, const std::string& unit = "") {
+AllowedRange<Number> InHalfOpen(Number min, Number max,
+                                const std::string& unit = "") {
   return {RangeText(unit, "in [", min, ", ", max, ")"),
           [min, max](Number value) { return value >= min && value < max; }};
 }
@@ -116,10 +118,12 @@ class OptionTable {
   void Add(Option option);
   void AddBool(const std::string& name, bool* value,
                const std::string& description);
-  void AddInteger(const std::string& name, int* value, const Range<int>& range,
+  void AddInteger(const std::string& name, int* value,
+                  const AllowedRange<int>& range,
                   const std::string& description);
   void AddReal(const std::string& name, double* value,
-               const Range<double>& range, const std::string& description);
+               const AllowedRange<double>& range,
+               const std::string& description);
   // The value may be given in upper or lower case, as in COLMAP; it is set to
   // one of `choices`.
   void AddChoice(const std::string& name, std::string* value,
