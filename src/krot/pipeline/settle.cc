@@ -10,7 +10,6 @@
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/convert/reprojection.h"
-#include "krot/model/rigs.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"

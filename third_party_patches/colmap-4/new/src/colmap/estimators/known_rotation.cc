@@ -19,7 +19,6 @@
 #include <krot/convert/certificate_file.h>
 #include <krot/check.h>
 #include <krot/outliers/outlier_filter.h>
-#include <krot/outliers/filter_steps.h>
 #include <krot/report/reports.h>
 
 namespace colmap {
