@@ -199,15 +199,9 @@ class Checker {
       // Three observations determine a pose, and as many must check it.
       if (image.num_tested - image.num_wrong < 6) {
         if (RelativeKept(n) < 1) few.push_back(n);
-        continue;
-      }
-      // Noise does not explain that tracks were lost; then a tenth of wrong
-      // matches is what a sound image may have.
-      std::optional<double> share;
-      if (RelativeKept(n) < 1) share = 0.1;
-      if (ContradictionExponent(n, share) > LeastExponent(n) &&
-          (weakest < 0 ||
-           sums_[n].CenterSpread() > sums_[weakest].CenterSpread())) {
+      } else if (ContradictionExponent(n) > LeastExponent(n) &&
+                 (weakest < 0 ||
+                  sums_[n].CenterSpread() > sums_[weakest].CenterSpread())) {
         weakest = n;
       }
     }
@@ -238,15 +232,13 @@ class Checker {
            ContradictionExponent(n) > LeastExponent(n);
   }
 
-  // exp(-exponent) bounds the probability that so many of its observations
-  // contradict where `share` of them is to be expected, none: as many as three
-  // times the noise contradicts; 0 if no more do.
-  double ContradictionExponent(size_t n,
-                               std::optional<double> share = {}) const {
+  // exp(-exponent) bounds the probability that three times the noise
+  // contradicts so many of its observations; 0 if as many are to be expected.
+  double ContradictionExponent(size_t n) const {
     const ImageCheck& image = check_.images[n];
     const double ratio = snooping_.noise.critical_w / 3;
     return SuccessExponent(image.num_wrong, image.num_tested,
-                           share.value_or(std::exp(-ratio * ratio / 2)));
+                           std::exp(-ratio * ratio / 2));
   }
 
   // Whether another pose takes half of its squared errors away.
