@@ -190,7 +190,8 @@ bool SolveKnownRotation(const KnownRotationOptions& options,
     return false;
   }
   if (result.outliers) {
-    LOG(INFO) << "Observations: " << krot::internal::BracketSentence(*result.outliers);
+    LOG(INFO) << "Observations: "
+              << krot::internal::BracketSentence(*result.outliers);
   }
   LogErrors(result.summary.pixel_error_before,
             result.summary.pixel_error_after);
@@ -208,20 +209,22 @@ bool FilterOutliers(const OutlierFilterOptions& options,
   krot::internal::OutlierFilterResult result;
   if (!RunStoppable(options.num_threads, options.check_if_stopped,
                     [&](const krot::Context& context) {
-                      result = krot::internal::FilterOutliers(ToKrotModel(reconstruction),
-                                                    filter_options, context);
+                      result = krot::internal::FilterOutliers(
+                          ToKrotModel(reconstruction), filter_options, context);
                     })) {
     return false;
   }
   if (!options.conflicts_path.empty() && result.summary.conflicts) {
     std::ofstream file(options.conflicts_path, std::ios::binary);
-    file << krot::internal::ConflictJson(*result.summary.conflicts) << std::flush;
+    file << krot::internal::ConflictJson(*result.summary.conflicts)
+         << std::flush;
     if (!file) {
       LOG(ERROR) << "Could not write " << options.conflicts_path;
       return false;
     }
   }
-  LOG(INFO) << "Observations: " << krot::internal::BracketSentence(result.summary);
+  LOG(INFO) << "Observations: "
+            << krot::internal::BracketSentence(result.summary);
   LogErrors(result.summary.pixel_error_before,
             result.summary.pixel_error_after);
   UpdateFromKrotModel(result.model, reconstruction);
@@ -296,7 +299,8 @@ bool RunKnownRotationPositioning(const GlobalPositionerOptions& options,
                   "tracks";
     return false;
   }
-  LOG(INFO) << "Observations: " << krot::internal::BracketSentence(result.summary)
+  LOG(INFO) << "Observations: "
+            << krot::internal::BracketSentence(result.summary)
             << "; largest reprojection error of the others: "
             << result.summary.pixel_error_after.max << "px";
   UpdateFromKrotModel(result.model, reconstruction);
