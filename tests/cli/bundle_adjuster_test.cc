@@ -205,6 +205,17 @@ TEST_F(BundleAdjuster, TakesKnownPositionsAsObservations) {
   }
 }
 
+TEST_F(BundleAdjuster, SaysThatNoKnownPositionTookPart) {
+  const std::string held = Load(folder_ / "input").images[0].name;
+  std::ofstream(folder_ / "held.txt") << held << '\n';
+  std::ofstream(folder_ / "gps.txt") << held << " 1 2 3 1\n";
+  const KrotResult result =
+      Adjust({"--positions_path", folder_ / "gps.txt", "--fixed_images_path",
+              folder_ / "held.txt"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::HasSubstr("No known position took part"));
+}
+
 TEST_F(BundleAdjuster, RefusesKnownPositionsWithACap) {
   std::ofstream(folder_ / "gps.txt") << "a.jpg 1 2 3 1\n";
   const KrotResult result = Adjust({"--positions_path", folder_ / "gps.txt",

@@ -109,9 +109,12 @@ Json KnownPositionsJson(const AdjustmentReport& report) {
   return json;
 }
 
-// Says how well the known positions fit.
+// Says how well the known positions fit, where some are given.
 std::string KnownPositionsSentence(const AdjustmentReport& report) {
   const BundleAdjustmentSummary& summary = report.summary.adjustment;
+  if (summary.num_positions == 0) {
+    return "No known position took part: nothing that they are of moves.";
+  }
   const auto farthest = std::max_element(
       report.positions->places.begin(), report.positions->places.end(),
       [](const auto& a, const auto& b) { return a.deviations < b.deviations; });
@@ -182,7 +185,7 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
   }
   text << ".\n";
   if (summary.max_error) text << CapSentence(summary) << '\n';
-  if (report.positions) text << KnownPositionsSentence(report) << '\n';
+  if (adjustment.sigma_px) text << KnownPositionsSentence(report) << '\n';
   if (summary.precision) text << PrecisionSentence(*summary.precision) << '\n';
   std::string adjusted;
   if (summary.start) {

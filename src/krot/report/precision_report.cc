@@ -107,6 +107,9 @@ std::string SummarySection(const AdjustModelSummary& summary,
   row("image points", Thousands(figures.num_observations));
   row("observations (image coordinates)",
       Thousands(2 * figures.num_observations));
+  if (precision.num_positions > 0) {
+    row("known positions", Thousands(precision.num_positions));
+  }
   row("unknowns", Thousands(precision.num_unknowns));
   row("datum defect", Thousands(precision.datum_defect));
   if (precision.num_undetermined > 0) {

@@ -38,7 +38,7 @@ std::optional<SurveyComparison> CompareWithSurvey(
   std::optional<Similarity> similarity = survey_from_model;
   survey.is_fitted = !similarity;
   if (!similarity) similarity = AlignCenters(pairs);
-  if (!similarity) return std::nullopt;
+  if (!similarity || pairs.empty()) return std::nullopt;
   survey.scale = similarity->scale;
   double sum = 0;
   for (size_t n = 0; n < pairs.size(); ++n) {

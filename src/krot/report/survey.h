@@ -33,7 +33,7 @@ struct SurveyComparison {
 // In the survey's frame and unit, after `survey_from_model`, or without it
 // after the similarity that fits the model best to the survey; then none if
 // there are fewer than three positions, or if they are on a line. Images
-// without a pose are left out.
+// without a pose are left out; none if nothing else is there.
 std::optional<SurveyComparison> CompareWithSurvey(
     const Model& model, const std::vector<KnownPosition>& surveyed,
     const std::optional<Similarity>& survey_from_model = {});
