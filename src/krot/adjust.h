@@ -45,7 +45,8 @@ struct BundleAdjustmentOptions {
 
   // Places of cameras and points that are known from elsewhere (GPS, a survey)
   // take part as observations: a region's semi-axes are three standard
-  // deviations. What takes no part or cannot move has none. Not with a cap.
+  // deviations. Those of what takes no part, or cannot move, are ignored. Not
+  // with a cap.
   std::vector<KnownPosition> positions;
   // The noise of a pixel coordinate, against which the positions weigh; > 0;
   // pixels. None: the model's sigma_px (krot/check.h), or 1 if it has none.

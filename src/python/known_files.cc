@@ -87,6 +87,12 @@ KnownPositions KnownFiles::Positions(const Model& model) const {
     throw OptionError(
         "output_frame has no effect without positions_frame='own'");
   }
+  if (positions_.have_own_frame && positions_.of_cameras.empty() &&
+      positions_.of_points.empty()) {
+    throw OptionError(
+        "positions_frame has no effect without positions_path or "
+        "point_positions_path");
+  }
   KnownPositions known = ReadKnownPositions(positions_, model, &Warn);
   if (!known.frame) return known;
   for (const WrongPosition& wrong : known.frame->wrong) {

@@ -112,16 +112,20 @@ TEST_F(BundleAdjuster, TellsOfItsPrecision) {
 }
 
 TEST_F(BundleAdjuster, WritesAProtocolWhereTheReportIsText) {
+  std::ofstream(folder_ / "gps.txt")
+      << Load(folder_ / "input").images[0].name << " 1 2 3 9\n";
   const KrotResult result =
       RunKrot({"bundle_adjuster", "--input_path", folder_ / "input",
                "--output_path", folder_ / "output", "--report_path",
-               folder_ / "report.txt", "--BundleAdjustment.datum", "POINTS"});
+               folder_ / "report.txt", "--BundleAdjustment.datum", "POINTS",
+               "--positions_path", folder_ / "gps.txt"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::string text = ReadBytes(folder_ / "report.txt");
   for (const char* part :
        {"sigma0 a posteriori, px", "largest residual: point3D_id ",
         "inner constraints over all object points", "Interior orientation",
         "Exterior orientation", "Reliability", "Rays per object point",
+        "Known positions, in their frame",
         "Object points; RMS of the standard deviations"}) {
     EXPECT_THAT(text, ::testing::HasSubstr(part));
   }
@@ -202,6 +206,20 @@ TEST_F(BundleAdjuster, TakesKnownPositionsAsObservations) {
     const Eigen::Vector3d before = Center(images[0].cam_from_world);
     EXPECT_LT((written - (frame == "own" ? surveyed(before) : before)).norm(),
               0.1);
+  }
+}
+
+// The noise that positions weigh beside is found in several adjustments.
+TEST_F(BundleAdjuster, TakesNoMoreIterationsThanAllowedWithKnownPositions) {
+  const Model model = Load(folder_ / "input");
+  std::ofstream(folder_ / "gps.txt") << model.images[0].name << " 1 2 3 9\n";
+  for (const int most : {0, 1, 4}) {
+    const KrotResult result =
+        Adjust({"--positions_path", folder_ / "gps.txt",
+                "--BundleAdjustment.max_num_iterations", std::to_string(most)});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_LE(Report()["num_iterations"], most);
+    EXPECT_EQ(Report()["iterations"].size(), Report()["num_iterations"]);
   }
 }
 

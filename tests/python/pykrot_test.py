@@ -115,8 +115,18 @@ def test_takes_positions_in_a_frame_of_their_own(scene, tmp_path):
         assert frame["scale"] == pytest.approx(3, rel=0.05)
         distances = np.linalg.norm(result.model.centers - places, axis=1)
         assert np.delete(distances, 1).max() < 0.2
-    with pytest.raises(pykrot.OptionError):
-        pykrot.solve(model, output_frame="own")
+    for words in ({"output_frame": "own"}, {"positions_frame": "own"}):
+        with pytest.raises(pykrot.OptionError):
+            pykrot.solve(model, **words)
+
+
+def test_adjusts_around_what_is_fixed(scene, tmp_path):
+    model = pykrot.Model.read(scene)
+    held = tmp_path / "held.txt"
+    held.write_text("".join(name + "\n" for name in model.image_names[:2]))
+    result = pykrot.bundle_adjust(model, fixed_images_path=str(held))
+    assert np.array_equal(result.model.centers[:2], model.centers[:2])
+    assert not np.array_equal(result.model.centers[2:], model.centers[2:])
 
 
 def test_the_sample_ends_where_the_command_ends(tmp_path):

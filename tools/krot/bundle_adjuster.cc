@@ -169,12 +169,10 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   CheckPositionsPath(paths, parser);
-  for (const char* name : {"positions_path", "point_positions_path"}) {
-    if (!parser.IsGiven("BundleAdjustment.max_error") &&
-        !parser.IsGiven("BundleAdjustment.max_error_factor")) {
-      break;
-    }
-    parser.Refuse(name, "with a cap");
+  if (parser.IsGiven("BundleAdjustment.max_error") ||
+      parser.IsGiven("BundleAdjustment.max_error_factor")) {
+    parser.Refuse("positions_path", "with a cap");
+    parser.Refuse("point_positions_path", "with a cap");
   }
   return Run(paths, check_points_path, common, options.Resolve(parser),
              options.num_threads());

@@ -12,9 +12,6 @@ using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// The semi-axes of a known region in standard deviations.
-constexpr double kSemiAxis = 3;
-
 Vector3d CenterInRig(const AdjustmentBlocks& blocks, int32_t sensor) {
   if (sensor < 0) return Vector3d::Zero();
   const PoseBlock& block = blocks.sensors[sensor];
@@ -48,7 +45,7 @@ void AddPositions(const Model& model,
     PositionObservation position;
     position.position = known.region.centre;
     position.px_from_world =
-        kSemiAxis * sigma_px * known.region.UnitFromWorld();
+        kRegionSigmas * sigma_px * known.region.UnitFromWorld();
     if (known.of == KnownPosition::Of::kPoint3D) {
       position.point = known.index;
       if (has_point[position.point] == 0) continue;

@@ -49,6 +49,10 @@ std::vector<char> FixedPoints3D(const FileBytes& file, const Model& model,
 // of 10^4.
 bool IsFit(const Ellipsoid& region);
 
+// Where a known position is given by its standard deviations, and where it is
+// understood so, the semi-axes of its region are so many of them.
+inline constexpr double kRegionSigmas = 3;
+
 struct PositionsOptions {
   // For lines without a radius; > 0, scene units. None: such lines are refused.
   std::optional<double> radius;

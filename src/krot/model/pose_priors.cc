@@ -168,7 +168,8 @@ std::optional<Ellipsoid> RegionOfPrior(const PosePrior& prior) {
   if (!(solver.eigenvalues().minCoeff() > 0)) return std::nullopt;
   Matrix3d axes = solver.eigenvectors();
   if (axes.determinant() < 0) axes.col(0) = -axes.col(0);
-  Ellipsoid region{prior.position, 3 * solver.eigenvalues().cwiseSqrt(),
+  Ellipsoid region{prior.position,
+                   kRegionSigmas * solver.eigenvalues().cwiseSqrt(),
                    Eigen::Quaterniond(axes)};
   if (!IsFit(region)) return std::nullopt;
   return region;

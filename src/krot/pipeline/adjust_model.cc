@@ -81,7 +81,7 @@ std::optional<Model> BoundedStart(const Model& model,
 
 // Finds the noise beside which known positions weigh, adjustment->sigma_px:
 // that of the model that is adjusted with it. Returns this model, and the
-// course so far.
+// course so far, whose iterations are taken off what is allowed.
 Model WeighPositions(const Model& model, const Context& context,
                      BundleAdjustmentOptions* adjustment,
                      BundleAdjustmentSummary* course) {
@@ -96,9 +96,10 @@ Model WeighPositions(const Model& model, const Context& context,
     BundleAdjustmentResult result =
         AdjustBundle(adjusted, *adjustment, context);
     adjusted = std::move(result.model);
+    adjustment->max_num_iterations -= result.summary.num_iterations;
     AddEarlier(std::move(*course), &result.summary);
     *course = std::move(result.summary);
-    if (context.IsCancelled()) break;
+    if (context.IsCancelled() || adjustment->max_num_iterations <= 0) break;
     const double before = *adjustment->sigma_px;
     adjustment->sigma_px = noise_of(adjusted);
     if (std::abs(*adjustment->sigma_px - before) <= kSame * before) break;

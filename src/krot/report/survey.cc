@@ -5,6 +5,7 @@
 
 #include "krot/analysis/model_comparison.h"
 #include "krot/compare.h"
+#include "krot/model/model_io.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {
@@ -12,7 +13,6 @@ namespace krot::internal {
 std::optional<SurveyComparison> CompareWithSurvey(
     const Model& model, const std::vector<KnownPosition>& surveyed,
     const std::optional<Similarity>& survey_from_model) {
-  constexpr double kSemiAxis = 3;  // standard deviations
   const std::vector<ImageGeometry> images = ImageGeometries(model);
   SurveyComparison survey;
   std::vector<PosePair> pairs;
@@ -33,7 +33,7 @@ std::optional<SurveyComparison> CompareWithSurvey(
     }
     survey.places.push_back(std::move(place));
     pairs.push_back(pair);
-    deviations_of.push_back(kSemiAxis * position.region.UnitFromWorld());
+    deviations_of.push_back(kRegionSigmas * position.region.UnitFromWorld());
   }
   std::optional<Similarity> similarity = survey_from_model;
   survey.is_fitted = !similarity;
