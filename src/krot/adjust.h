@@ -48,8 +48,15 @@ struct BundleAdjustmentOptions {
   // deviations. Those of what takes no part, or cannot move, are ignored. Not
   // with a cap.
   std::vector<KnownPosition> positions;
-  // The noise of a pixel coordinate, against which the positions weigh; > 0;
-  // pixels. None: the model's sigma_px (krot/check.h), or 1 if it has none.
+  // Distances between cameras and points that are known from elsewhere (scale
+  // bars), where the model's unit is the metre: a tolerance is three standard
+  // deviations. Those whose ends do not move against each other, or are in
+  // parts that no observation ties together, are ignored; Adjust also leaves
+  // out those that contradict the others. Not with a cap.
+  std::vector<KnownDistance> distances;
+  // The noise of a pixel coordinate, against which positions and distances
+  // weigh; > 0; pixels. None: the model's sigma_px (krot/check.h), or 1 if it
+  // has none.
   std::optional<double> sigma_px;
 
   // Points with fewer usable observations take no part unless they are fixed;
@@ -115,10 +122,11 @@ struct BundleAdjustmentSummary {
   int64_t num_short_track = 0;
   int64_t num_parameters = 0;      // that moved, gauge included
   int64_t num_positions = 0;       // known ones that took part
+  int64_t num_distances = 0;       // known ones that took part
   std::optional<double> sigma_px;  // pixel noise, against which they weighed
 
-  // Half the sum of the robust squared errors, and of the known positions' in
-  // pixels, pixels^2.
+  // Half the sum of the robust squared errors, and of those of the known
+  // positions and distances in pixels, pixels^2.
   double cost_initial = 0;
   double cost_final = 0;
   int num_iterations = 0;

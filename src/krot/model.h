@@ -159,6 +159,18 @@ struct KnownPosition {
   Ellipsoid region;
 };
 
+// The distance between two cameras, two points, or one of each, and its true
+// length if that is known.
+struct KnownDistance {
+  struct End {
+    bool is_image = false;
+    int32_t index = 0;  // in Model::images or Model::points3D
+  };
+  std::array<End, 2> ends;
+  std::optional<double> metres;  // > 0
+  double tolerance = 0;          // metres; > 0 if `metres` is known
+};
+
 // ---- Files ----
 
 enum class ModelFormat { kBinary, kText };

@@ -199,12 +199,17 @@ Outcome AdjustCommand(const ModelPointer& model, const Progress& progress,
   KnownFiles known;
   known.AddFixedTo(&table);
   known.AddPositionsTo(&table);
+  known.AddDistancesTo(&table);
   AssignKeywords(keywords, &table);
   AdjustModelOptions options = given.Resolve(table);
   Model input = *model;
-  const Survey survey(known.Positions(input), known.writes_own_frame(), &input);
   options.adjustment.fixed = known.Fixed(input);
+  const Survey survey(known.Positions(input), known.writes_own_frame(), &input);
   options.adjustment.positions = survey.positions();
+  const DistanceSurvey distances(
+      known.Distances(input),
+      options.adjustment.fixed.Any() ? 1 : survey.scale(), &input);
+  options.adjustment.distances = distances.distances();
   Follow(progress, &options.start);
   AdjustModelResult result;
   RunInterruptibly([&](const CancelFlag& cancel) {
@@ -216,6 +221,7 @@ Outcome AdjustCommand(const ModelPointer& model, const Progress& progress,
   report.positions = survey.ComparePositions(result.model);
   report.position_frame = survey.frame();
   report.is_in_position_frame = survey.is_in_own_frame();
+  report.distances = distances.Compare(result.model, report.summary);
   std::string json = AdjustmentJson(report, result.model);
   return {std::make_shared<Model>(std::move(result.model)), std::move(json),
           std::nullopt};

@@ -3,6 +3,7 @@
 #include <pybind11/pybind11.h>
 
 #include "krot/analysis/model_input.h"
+#include "krot/model/known_distances.h"
 #include "krot/model/model_io.h"
 
 namespace krot::internal {
@@ -51,6 +52,10 @@ void KnownFiles::AddPositionsTo(OptionTable* table) {
   table->AddChoice("output_frame", &output_frame_, {"model", "own"}, "");
 }
 
+void KnownFiles::AddDistancesTo(OptionTable* table) {
+  AddFile("distances_path", &distances_path_, table);
+}
+
 void KnownFiles::AddDatabaseTo(OptionTable* table) {
   AddFile("database_path", &database_path_, table);
 }
@@ -80,6 +85,12 @@ FixedParts KnownFiles::Fixed(const Model& model) const {
         FixedPoints3D(ReadFileBytes(fixed_points_path_), model, &Warn);
   }
   return fixed;
+}
+
+std::vector<KnownDistance> KnownFiles::Distances(const Model& model) const {
+  if (distances_path_.empty()) return {};
+  return ReadDistances(ReadFileBytes(distances_path_), model,
+                       /*may_lack_metres=*/true, &Warn);
 }
 
 KnownPositions KnownFiles::Positions(const Model& model) const {

@@ -21,6 +21,7 @@ class KnownFiles {
   void AddRotationsTo(OptionTable* table);
   void AddFixedTo(OptionTable* table);
   void AddPositionsTo(OptionTable* table);
+  void AddDistancesTo(OptionTable* table);
   void AddDatabaseTo(OptionTable* table);
 
   // The model, or a copy with the rotations of the file. Records what the file
@@ -31,6 +32,8 @@ class KnownFiles {
   // Warns of positions that contradict the others, in their own frame.
   KnownPositions Positions(const Model& model) const;
   bool writes_own_frame() const { return output_frame_ == "own"; }
+  // With those whose length is only asked for.
+  std::vector<KnownDistance> Distances(const Model& model) const;
   // None if no database is given.
   std::optional<Database> Matches(const Model& model) const;
 
@@ -40,6 +43,7 @@ class KnownFiles {
   std::string fixed_points_path_;
   PositionFiles positions_;
   std::string output_frame_ = "model";
+  std::string distances_path_;
   std::string database_path_;
 };
 

@@ -17,6 +17,7 @@
 #include "krot/compare.h"
 #include "krot/context.h"
 #include "krot/model.h"
+#include "krot/model/known_distances.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
@@ -105,9 +106,34 @@ struct FixedRotationPosition {
   }
 };
 
+// Of what is at R'unknown times the sign. A third of the tolerance is one
+// standard deviation.
+struct FixedRotationDistance {
+  std::array<Eigen::Matrix3d, 2> R;
+  std::array<double, 2> signs;
+  double length;
+  double px_per_unit;
+
+  template <typename T>
+  bool operator()(const T* a, const T* b, T* residual) const {
+    T square(0);
+    for (int i = 0; i < 3; ++i) {
+      T difference(0);
+      for (int j = 0; j < 3; ++j) {
+        difference +=
+            signs[0] * R[0](j, i) * a[j] - signs[1] * R[1](j, i) * b[j];
+      }
+      square += difference * difference;
+    }
+    *residual = px_per_unit * (sqrt(square) - length);
+    return true;
+  }
+};
+
 double IndependentFixedRotationCost(
     const Model& model, ceres::LossFunction* loss, const FixedParts& fixed = {},
-    const std::vector<KnownPosition>& positions = {}, double sigma_px = 1) {
+    const std::vector<KnownPosition>& positions = {}, double sigma_px = 1,
+    const std::vector<KnownDistance>& distances = {}) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const auto image_indices = ImageIndices(model);
   std::vector<Eigen::Vector3d> translations, points;
@@ -145,6 +171,23 @@ double IndependentFixedRotationCost(
         nullptr,
         is_point ? points[known.index].data()
                  : translations[known.index].data());
+  }
+  for (const KnownDistance& known : distances) {
+    FixedRotationDistance cost;
+    std::array<double*, 2> unknowns;
+    for (size_t n = 0; n < 2; ++n) {
+      const auto [is_image, index] = known.ends[n];
+      cost.R[n].setIdentity();
+      if (is_image) cost.R[n] = geometries[index].cam_from_world.rotation;
+      cost.signs[n] = is_image ? -1 : 1;
+      unknowns[n] = (is_image ? translations : points)[index].data();
+    }
+    cost.length = *known.metres;
+    cost.px_per_unit = 3 * sigma_px / known.tolerance;
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<FixedRotationDistance, 1, 3, 3>(
+            new FixedRotationDistance(cost)),
+        nullptr, unknowns[0], unknowns[1]);
   }
   if (positions.empty()) {
     problem.SetParameterBlockConstant(translations[0].data());
@@ -225,6 +268,90 @@ TEST(AdjustBundle, WithKnownPositionsEndsWhereAnIndependentProblemDoes) {
       model, nullptr, {}, options.positions, *options.sigma_px);
   EXPECT_NEAR(result.summary.cost_final, expected, 1e-8 * expected);
   EXPECT_LT(CostOf(result.model), 0.999 * expected);
+}
+
+// The ends of a distance: images are i, points -1 - k.
+std::array<KnownDistance::End, 2> Ends(int32_t a, int32_t b) {
+  const auto end = [](int32_t n) {
+    return n >= 0 ? KnownDistance::End{true, n}
+                  : KnownDistance::End{false, -1 - n};
+  };
+  return {end(a), end(b)};
+}
+
+// Of all kinds, two at one point; each `factor` times as long as in the model,
+// to within a thousandth.
+std::vector<KnownDistance> SomeDistances(const Model& model, double factor) {
+  std::vector<KnownDistance> distances = {
+      {Ends(0, 4), 1.0}, {Ends(-3, -8), 1.0}, {Ends(-3, 5), 1.0}};
+  const std::vector<double> lengths = LengthsOf(model, distances);
+  for (size_t n = 0; n < lengths.size(); ++n) {
+    distances[n].metres = factor * lengths[n];
+    distances[n].tolerance = 1e-3 * lengths[n];
+  }
+  return distances;
+}
+
+// Lengths that the images contradict, so that both give way.
+TEST(AdjustBundle, WithKnownDistancesEndsWhereAnIndependentProblemDoes) {
+  const Model model = SynthesizeScene(SmallOptions()).model;
+  BundleAdjustmentOptions options = RotationsFixed();
+  options.distances = SomeDistances(model, 1);
+  *options.distances[0].metres *= 1.01;
+  *options.distances[2].metres *= 0.99;
+  options.sigma_px = 0.7;
+  const BundleAdjustmentResult result =
+      AdjustBundle(model, options, kAdjustAlone);
+  EXPECT_EQ(result.summary.num_distances, 3);
+  const double expected = IndependentFixedRotationCost(
+      model, nullptr, {}, {}, *options.sigma_px, options.distances);
+  EXPECT_NEAR(result.summary.cost_final, expected, 1e-8 * expected);
+  EXPECT_LT(CostOf(result.model), 0.999 * expected);
+}
+
+// What is exact stays exact, and takes the scale of the distances, with images
+// in rigs; without moving or turning.
+TEST(AdjustBundle, TakesTheModelToKnownDistances) {
+  SceneOptions scene = SmallOptions();
+  scene.sensors_per_rig = 2;
+  scene.pixel_noise = 0;
+  const Model truth = SynthesizeScene(scene).ground_truth;
+  BundleAdjustmentOptions options = Exact();
+  options.sigma_px = 1;
+  for (const double factor : {0.97, 1.02}) {
+    options.distances = SomeDistances(truth, factor);
+    const Model result = AdjustBundle(truth, options, kAdjustAlone).model;
+    const std::vector<double> lengths = LengthsOf(result, options.distances);
+    for (size_t n = 0; n < lengths.size(); ++n) {
+      EXPECT_NEAR(lengths[n], *options.distances[n].metres, 1e-6);
+    }
+    EXPECT_LT(Summarize(PixelErrors(result, 1)).max, 1e-4);
+    for (size_t f = 0; f < truth.frames.size(); ++f) {
+      EXPECT_TRUE(truth.frames[f].rig_from_world.Rotation().isApprox(
+          result.frames[f].rig_from_world.Rotation(), 1e-7));
+    }
+  }
+}
+
+TEST(AdjustBundle, LeavesOutDistancesThatCannotChange) {
+  SceneOptions scene = SmallOptions();
+  scene.sensors_per_rig = 2;
+  const Model model = SynthesizeScene(scene).model;
+  BundleAdjustmentOptions options = Exact();
+  options.sigma_px = 1;
+  options.fixed = SomeFixed(model);
+  const auto num_taking_part = [&](std::array<KnownDistance::End, 2> ends) {
+    options.distances = {{ends, 1.0, 0.1}};
+    return AdjustBundle(model, options, kAdjustAlone).summary.num_distances;
+  };
+  EXPECT_EQ(num_taking_part(Ends(-2, -3)), 0);  // fixed points
+  EXPECT_EQ(num_taking_part(Ends(-2, -4)), 1);
+  EXPECT_EQ(num_taking_part(Ends(2, 3)), 0);  // a rig that sees what is fixed
+  options.fixed = {};
+  EXPECT_EQ(num_taking_part(Ends(2, 3)), 1);
+  options.refine_sensor_from_rig = false;
+  EXPECT_EQ(num_taking_part(Ends(2, 3)), 0);
+  EXPECT_EQ(num_taking_part(Ends(2, 5)), 1);
 }
 
 // What is exact stays exact, with images in rigs and rotations that move, and

@@ -6,14 +6,14 @@
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
-#include <Eigen/LU>
-#include <Eigen/SVD>
 
 #include "krot/adjust/precision_system.h"
 #include "krot/geometry.h"
+#include "krot/model/known_distances.h"
 #include "krot/model/rigs.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/synthetic/scene.h"
+#include "tests/oracle/dense_algebra.h"
 
 // The oracle knows no derivative, eliminates nothing and has no formula of a
 // gauge: central differences of all errors, and of what the datum holds, by all
@@ -47,20 +47,21 @@ Model PreciseScene(int camera_model_id, int sensors_per_rig = 2) {
 using Functional = std::function<VectorXd(const AdjustmentBlocks&)>;
 
 VectorXd StackedErrors(const AdjustmentBlocks& blocks) {
+  std::vector<double> stacked;
+  const auto add = [&](const auto& error) {
+    stacked.insert(stacked.end(), error.data(), error.data() + error.size());
+  };
   const auto errors = ProjectErrors(blocks, 1e300, 1);
-  const auto num_coordinates = 2 * static_cast<Index>(errors->size());
-  VectorXd stacked(num_coordinates +
-                   3 * static_cast<Index>(blocks.positions.size()));
-  for (size_t i = 0; i < errors->size(); ++i) {
-    stacked.segment<2>(static_cast<Index>(2 * i)) = (*errors)[i].r;
+  for (const ProjectedError& error : *errors) add(error.r);
+  for (const PositionObservation& position : blocks.positions) {
+    add(Vector3d(position.px_from_world *
+                 (PositionOf(position.of, blocks) - position.position)));
   }
-  for (size_t n = 0; n < blocks.positions.size(); ++n) {
-    const PositionObservation& position = blocks.positions[n];
-    stacked.segment<3>(num_coordinates + static_cast<Index>(3 * n)) =
-        position.px_from_world *
-        (PlaceOf(position, blocks) - position.position);
+  for (const DistanceObservation& distance : blocks.distances) {
+    if (distance.px_from_world == 0) continue;
+    stacked.push_back(ErrorPx(distance, blocks));
   }
-  return stacked;
+  return VectorXd::Map(stacked.data(), static_cast<Index>(stacked.size()));
 }
 
 // By all unknowns, points first.
@@ -165,6 +166,7 @@ struct DenseOracle {
       : blocks(MakeAdjustmentBlocks(model, 2, options.fixed)),
         columns(options, blocks) {
     AddPositions(model, options.positions, 1, columns, &blocks);
+    AddDistances(model, options, &columns, &blocks);
     const MatrixXd J = Differentiate(columns, blocks, StackedErrors);
     const VectorXd norms = J.colwise().norm();
     std::vector<Index> moving;
@@ -180,16 +182,18 @@ struct DenseOracle {
       return picked;
     };
     const MatrixXd scaled = pick(J);
-    const Eigen::BDCSVD<MatrixXd> svd(
-        scaled, Eigen::ComputeThinU | Eigen::ComputeFullV);
-    Index rank = 0;
-    while (rank < svd.singularValues().size() &&
-           svd.singularValues()[rank] > 1e-7) {
-      ++rank;
-    }
+    // The eigenvalues are those of J, of both signs, and zeros; R projects
+    // onto what belongs to the zeros.
+    MatrixXd both =
+        MatrixXd::Zero(J.rows() + scaled.cols(), J.rows() + scaled.cols());
+    both.topRightCorner(J.rows(), scaled.cols()) = scaled;
+    both.bottomLeftCorner(scaled.cols(), J.rows()) = scaled.transpose();
+    const SymmetricEigen eigen = EigenOfSymmetric(both);
+    const Index rank = (eigen.values.array() > 1e-7).count();
     redundancy = J.rows() - rank;
-    R = MatrixXd::Identity(J.rows(), J.rows()) -
-        svd.matrixU().leftCols(rank) * svd.matrixU().leftCols(rank).transpose();
+    const MatrixXd none = eigen.vectors.topRows(J.rows()).middleCols(
+        rank, eigen.values.size() - 2 * rank);
+    R = none * none.transpose();
     sigma0 = std::sqrt(StackedErrors(blocks).squaredNorm() /
                        static_cast<double>(redundancy));
     const Functional held = [&](const AdjustmentBlocks& moved) {
@@ -199,17 +203,19 @@ struct DenseOracle {
     };
     const Index size = scaled.cols();
     defect = size - rank;
-    // Of what the datum holds, as much as there is to hold.
-    const MatrixXd gauge = svd.matrixV().rightCols(defect);
-    const MatrixXd B =
-        pick(Differentiate(columns, blocks, held)).transpose() *
-        (defect == 7 ? MatrixXd::Identity(7, 7) : MatrixXd::Identity(7, 0));
+    // What the datum holds: all but the scale where distances give that, and
+    // nothing where more is known or fixed.
+    const MatrixXd B = pick(Differentiate(columns, blocks, held))
+                           .transpose()
+                           .leftCols(defect < 6 ? 0 : defect);
     MatrixXd bordered = MatrixXd::Zero(size + B.cols(), size + B.cols());
     bordered.topLeftCorner(size, size) = scaled.transpose() * scaled;
     bordered.topRightCorner(size, B.cols()) = B;
     bordered.bottomLeftCorner(B.cols(), size) = B.transpose();
     const MatrixXd inverse =
-        bordered.fullPivLu().inverse().topLeftCorner(size, size);
+        SolveByLu(bordered,
+                  MatrixXd::Identity(bordered.rows(), bordered.cols()))
+            .topLeftCorner(size, size);
     C = MatrixXd::Zero(J.cols(), J.cols());
     for (size_t a = 0; a < moving.size(); ++a) {
       for (size_t b = 0; b < moving.size(); ++b) {
@@ -238,8 +244,9 @@ AdjustmentPrecision PrecisionOf(const Model& model,
                                 AdjustmentDatum datum) {
   AdjustmentBlocks blocks =
       MakeAdjustmentBlocks(model, options.min_track_length, options.fixed);
-  const AdjustmentColumns columns(options, blocks);
+  AdjustmentColumns columns(options, blocks);
   AddPositions(model, options.positions, 1, columns, &blocks);
+  AddDistances(model, options, &columns, &blocks);
   return FindPrecision(model, options, columns, blocks, datum, {});
 }
 
@@ -288,6 +295,25 @@ void ExpectByDefinition(const Model& model,
                  }
                  return params;
                }));
+  }
+  ASSERT_EQ(precision.distances.size(), options.distances.size());
+  Index row = oracle.R.rows() - precision.num_distances;
+  for (size_t n = 0; n < precision.distances.size(); ++n) {
+    const DistancePrecision& distance = precision.distances[n];
+    const DistanceObservation& of = oracle.blocks.distances[n];
+    const MatrixXd variance =
+        oracle.CovarianceOf([&](const AdjustmentBlocks& blocks) {
+          return VectorXd::Constant(1, LengthOf(of, blocks));
+        });
+    EXPECT_NEAR(distance.sigma, std::sqrt(variance(0, 0)),
+                1e-4 * distance.sigma);
+    if (!options.distances[n].metres) continue;
+    const double r = oracle.R(row, row);
+    ++row;
+    EXPECT_NEAR(distance.redundancy, r, 1e-4);
+    EXPECT_NEAR(distance.w,
+                ErrorPx(of, oracle.blocks) / (oracle.sigma0 * std::sqrt(r)),
+                1e-3 * std::abs(distance.w));
   }
 }
 
@@ -373,6 +399,64 @@ TEST(Precision, CountsTheGaugeThatKnownPositionsLeave) {
   EXPECT_EQ(defect(0, 1), 4);  // turns about the point, and the scale
   EXPECT_EQ(defect(1, 1), 1);  // turns about the line
   EXPECT_EQ(defect(1, 2), 0);
+}
+
+KnownDistance::End Camera(int32_t image) { return {true, image}; }
+KnownDistance::End Point(int32_t point) { return {false, point}; }
+
+// A per cent too long, to within three.
+std::vector<KnownDistance> SomeDistances(
+    const Model& model,
+    const std::vector<std::array<KnownDistance::End, 2>>& ends) {
+  std::vector<KnownDistance> distances;
+  for (const auto& pair : ends) distances.push_back({pair, {}, 0});
+  const std::vector<double> lengths = LengthsOf(model, distances);
+  for (size_t n = 0; n < ends.size(); ++n) {
+    distances[n].metres = 1.01 * lengths[n];
+    distances[n].tolerance = 0.03 * lengths[n];
+  }
+  return distances;
+}
+
+// Between points, which share one, between cameras, in one rig and in two, and
+// from a camera to a point; the last length is only asked for.
+TEST(Precision, IsByItsDefinitionWhereDistancesAreKnown) {
+  BundleAdjustmentOptions options;
+  options.sigma_px = 1;
+  for (const int sensors_per_rig : {1, 2}) {
+    const Model model = PreciseScene(2, sensors_per_rig);
+    options.distances = SomeDistances(model, {{Point(0), Point(3)},
+                                              {Point(3), Point(9)},
+                                              {Camera(0), Camera(1)},
+                                              {Camera(3), Camera(0)},
+                                              {Camera(2), Point(5)},
+                                              {Point(1), Point(2)}});
+    options.distances.back().metres.reset();
+    for (const AdjustmentDatum datum :
+         {AdjustmentDatum::kCameras, AdjustmentDatum::kPoints}) {
+      ExpectByDefinition(model, options, datum);
+      EXPECT_EQ(PrecisionOf(model, options, datum).datum_defect, 6);
+    }
+    options.positions = SomePositions(model, 1, 4);
+    ExpectByDefinition(model, options, AdjustmentDatum::kCameras);
+    options.positions.clear();
+  }
+}
+
+// Lengths that are only asked for leave the scale free.
+TEST(Precision, OfALengthIsThatOfItsDatum) {
+  const Model model = PreciseScene(2, 1);
+  BundleAdjustmentOptions options;
+  options.sigma_px = 1;
+  options.distances =
+      SomeDistances(model, {{Point(0), Point(3)}, {Camera(0), Point(3)}});
+  for (KnownDistance& distance : options.distances) distance.metres.reset();
+  for (const AdjustmentDatum datum :
+       {AdjustmentDatum::kCameras, AdjustmentDatum::kPoints,
+        AdjustmentDatum::kFirstCamera}) {
+    ExpectByDefinition(model, options, datum);
+    EXPECT_EQ(PrecisionOf(model, options, datum).datum_defect, 7);
+  }
 }
 
 TEST(Precision, CountsTheGaugeThatFixedPartsLeave) {
@@ -559,6 +643,48 @@ TEST(Precision, CoversTheTruthWherePositionsAreKnown) {
       static_cast<double>(within) / static_cast<double>(num_tried);
   EXPECT_GT(share, 0.92);
   EXPECT_LT(share, 0.98);
+}
+
+// 40 scenes, each scaled by scale bars with noise: of the lengths that are only
+// asked for, 5 % are farther off than 1.96 standard deviations.
+TEST(Precision, CoversTheTruthOfLengthsWhereDistancesAreKnown) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise(0, 1);
+  int64_t num_tried = 0, within = 0;
+  for (int seed = 0; seed < 40; ++seed) {
+    SceneOptions options;
+    options.num_frames = 10;
+    options.num_points = 80;
+    options.track_length = 5;
+    options.pixel_noise = 0.7;
+    options.start_translation_noise = 0.002;
+    options.start_point_noise = 0.002;
+    options.random_seed = seed;
+    const SyntheticScene scene = SynthesizeScene(options);
+    AdjustModelOptions adjust;
+    adjust.finds_precision = true;
+    std::vector<KnownDistance>& distances = adjust.adjustment.distances;
+    for (int32_t k = 0; k < 40; k += 2) {
+      distances.push_back({{Point(k), Point(k + 1)}, {}, 0});
+    }
+    const std::vector<double> truth = LengthsOf(scene.ground_truth, distances);
+    for (size_t n = 0; n < 6; ++n) {
+      const double sigma = 1e-3 * truth[n];
+      distances[n].metres = truth[n] + sigma * noise(random);
+      distances[n].tolerance = 3 * sigma;
+    }
+    const AdjustModelResult result = AdjustModel(scene.model, adjust, {1});
+    EXPECT_EQ(result.summary.adjustment.num_distances, 6);
+    for (const DistancePrecision& of : result.summary.precision->distances) {
+      if (distances[of.distance].metres) continue;
+      within += std::abs(of.length - truth[of.distance]) < 1.96 * of.sigma;
+      ++num_tried;
+    }
+  }
+  EXPECT_EQ(num_tried, 40 * 14);
+  const double share =
+      static_cast<double>(within) / static_cast<double>(num_tried);
+  EXPECT_NEAR(share, 0.95, 0.02);
 }
 
 }  // namespace

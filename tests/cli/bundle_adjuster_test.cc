@@ -156,6 +156,60 @@ TEST_F(BundleAdjuster, ComparesCheckPointsWithTheirSurvey) {
   EXPECT_LT(points["rms"], 0.3 / std::sqrt(40.0));
 }
 
+// A unit of the model is 2.5 m by three scale bars; a fourth is 10 % too long,
+// and a length is only asked for.
+TEST_F(BundleAdjuster, TakesScaleBarsAsObservations) {
+  ASSERT_EQ(Adjust({}).exit_code, 0);
+  const Model model = Load(folder_ / "output");
+  const auto write = [&](const std::vector<double>& factors) {
+    std::ofstream file(folder_ / "bars.txt");
+    file.precision(17);
+    for (size_t n = 0; n < factors.size(); ++n) {
+      const Point3D& a = model.points3D[2 * n];
+      const Point3D& b = model.points3D[2 * n + 1];
+      file << a.id << ' ' << b.id;
+      if (factors[n] > 0) {
+        file << ' ' << factors[n] * (a.xyz - b.xyz).norm() << " 0.01";
+      }
+      file << '\n';
+    }
+  };
+  write({2.5, 2.5, 2.5, 2.75, 0});
+  const Words bars = {"--distances_path", folder_ / "bars.txt"};
+  const KrotResult result = Adjust(bars);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::HasSubstr("3 known distances took part"));
+  const Json report = Report();
+  const Json& distances = report["distances"];
+  EXPECT_NEAR(distances["metres_per_unit"], 2.5, 0.05);
+  EXPECT_EQ(report["precision"]["datum_defect"], 6);
+  const Model output = Load(folder_ / "output");
+  for (size_t n = 0; n < 5; ++n) {
+    const Json& bar = distances["distances"][n];
+    EXPECT_EQ(bar["is_contradicted"], n == 3);
+    EXPECT_NEAR(
+        bar["after"],
+        (output.points3D[2 * n].xyz - output.points3D[2 * n + 1].xyz).norm(),
+        1e-9);
+    EXPECT_GT(bar["sigma"], 0);
+    EXPECT_EQ(bar["w"].is_number(), n < 3);
+    if (n < 3) {
+      EXPECT_NEAR(bar["after"], bar["metres"], 0.01);
+    }
+  }
+
+  write({2.5, 2.75});
+  const KrotResult undecided = Adjust(bars);
+  EXPECT_EQ(undecided.exit_code, 2);
+  EXPECT_THAT(undecided.err,
+              ::testing::HasSubstr("distances: found 2 distances "
+                                   "that contradict"));
+  EXPECT_EQ(Adjust({"--distances_path", folder_ / "bars.txt",
+                    "--BundleAdjustment.max_error", "9"})
+                .exit_code,
+            1);
+}
+
 // GPS in a frame of its own, 3 times as large, with standard deviations of
 // 0.02, one of them wrong by 5: the model comes to that frame, and check points
 // are compared there.

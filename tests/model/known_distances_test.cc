@@ -46,13 +46,13 @@ TEST(ReadDistances, TakesImagesAndPointsByTheirNames) {
                       point1 + " " + point2 + " 4 5\n" + first + "\t" + point2 +
                       "\t6\t7\n");
   ASSERT_EQ(distances.size(), 4u);
-  EXPECT_EQ(distances[0].Name(model), first + " to " + second);
+  EXPECT_EQ(NameOf(model, distances[0]), first + " to " + second);
   EXPECT_EQ(distances[0].metres, 1.5);
   EXPECT_EQ(distances[0].tolerance, 0.01);
-  EXPECT_EQ(distances[1].Name(model), second + " to " + first);
-  EXPECT_EQ(distances[2].Name(model),
+  EXPECT_EQ(NameOf(model, distances[1]), second + " to " + first);
+  EXPECT_EQ(NameOf(model, distances[2]),
             "3D point " + point1 + " to 3D point " + point2);
-  EXPECT_EQ(distances[3].Name(model), first + " to 3D point " + point2);
+  EXPECT_EQ(NameOf(model, distances[3]), first + " to 3D point " + point2);
   EXPECT_EQ(distances[3].tolerance, 7);
 }
 

@@ -120,6 +120,20 @@ def test_takes_positions_in_a_frame_of_their_own(scene, tmp_path):
             pykrot.solve(model, **words)
 
 
+def test_adjusts_to_the_metres_of_scale_bars(scene, tmp_path):
+    model = pykrot.bundle_adjust(pykrot.Model.read(scene)).model
+    names = model.image_names
+    lengths = np.linalg.norm(model.centers[0] - model.centers[2:5], axis=1)
+    bars = tmp_path / "bars.txt"
+    bars.write_text("".join(
+        f"{names[0]} {name} {4 * length!r} {1e-3 * length!r}\n"
+        for name, length in zip(names[2:5], lengths.tolist())))
+    result = pykrot.bundle_adjust(model, distances_path=str(bars))
+    assert result.report["distances"]["num_taking_part"] == 3
+    assert np.linalg.norm(result.model.centers[0] - result.model.centers[2:5],
+                          axis=1) == pytest.approx(4 * lengths, rel=1e-3)
+
+
 def test_adjusts_around_what_is_fixed(scene, tmp_path):
     model = pykrot.Model.read(scene)
     held = tmp_path / "held.txt"

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Positions from nothing by the number of images and the share of outliers.
+"""Positions from nothing by the number of images, outliers and rotations.
 
     positions_at_size.py KROT BENCHMARK [IMAGES ...]
 
 KROT and BENCHMARK are the built programs. Makes rings of so many images (200,
 1000 and 5000 if none are given; 400 observations each, tracks of eight, noise
-of 1 px, rotations off by 0.3 degrees) with 0, 10 and 30 % of the observations
-wrong, lets `krot solver --Solver.init feasible` find the positions and `krot
+of 1 px) with 0, 10 and 30 % of the observations wrong and rotations off by 0,
+0.3, 1 and 3 degrees (by 0.3 beyond 1000 images), lets `krot solver --Solver.init feasible` find the positions and `krot
 bundle_adjuster` adjust them with a Cauchy loss; up to 1000 images also the
 rival of bearings (`krot_benchmark positioning`). Prints user and system CPU
 seconds, memory, and the RMS distance of the centres from the truth as a
@@ -48,7 +48,7 @@ def cell(value):
     return "" if value is None else f"{value:.3f}"
 
 
-def measure(krot, benchmark, folder, images, share):
+def measure(krot, benchmark, folder, images, share, turned):
     """One row of the table."""
     scene, truth, out, rival, adjusted, report, compared = (
         os.path.join(folder, name)
@@ -61,7 +61,7 @@ def measure(krot, benchmark, folder, images, share):
                   "--Scene.track_length", "8",
                   "--Scene.camera_model", "PINHOLE", "--Scene.pixel_noise", "1",
                   "--Scene.outlier_ratio", str(share),
-                  "--Scene.rotation_noise_deg", "0.3")
+                  "--Scene.rotation_noise_deg", str(turned))
     if code != 0:
         sys.exit(f"model_synthesizer ended with code {code}")
 
@@ -75,11 +75,12 @@ def measure(krot, benchmark, folder, images, share):
                         "--output_path", out, "--report_path", report,
                         "--Solver.init", "feasible")
     if not os.path.exists(report):
-        return f"| {images} | {share:.0%} | {seconds:.1f} | | {code} | | | | | | |"
+        return (f"| {images} | {share:.0%} | {turned} | {seconds:.1f} | |"
+                f" {code} | | | | | | | |")
     with open(report, encoding="utf-8") as file:
         memory = json.load(file)["peak_memory_bytes"]
-    row = (f"| {images} | {share:.0%} | {seconds:.1f} | {memory / 2**20:.0f} |"
-           f" {code} | {cell(centres(krot, truth, out, compared))} |"
+    row = (f"| {images} | {share:.0%} | {turned} | {seconds:.1f} |"
+           f" {memory / 2**20:.0f} | {code} | {cell(centres(krot, truth, out, compared))} |"
            f" {adjust(out)} |")
     if images > 1000:
         return row + " | | | |"
@@ -93,13 +94,15 @@ def measure(krot, benchmark, folder, images, share):
 def main():
     if len(sys.argv) < 3:
         sys.exit(__doc__)
-    print("| images | wrong | processor s | MB | code | centres | adjusted | s"
-          " | rival: s | centres | adjusted | s |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print("| images | wrong | degrees | processor s | MB | code | centres |"
+          " adjusted | s | rival: s | centres | adjusted | s |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     for images in [int(n) for n in sys.argv[3:]] or [200, 1000, 5000]:
         for share in (0, 0.1, 0.3):
-            with tempfile.TemporaryDirectory() as folder:
-                print(measure(*sys.argv[1:3], folder, images, share), flush=True)
+            for turned in (0, 0.3, 1, 3) if images <= 1000 else (0.3,):
+                with tempfile.TemporaryDirectory() as folder:
+                    print(measure(*sys.argv[1:3], folder, images, share, turned),
+                          flush=True)
 
 
 if __name__ == "__main__":

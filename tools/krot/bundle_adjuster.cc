@@ -71,6 +71,16 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
   }
 }
 
+// Without metres where a length is only asked for; empty without a file.
+std::vector<KnownDistance> ReadDistanceFile(const ModelPaths& paths,
+                                            const Model& model,
+                                            const LogOptions& log) {
+  if (paths.distances_path.empty()) return {};
+  LogInput(paths.distances_path);
+  return ReadDistances(ReadFileBytes(paths.distances_path), model,
+                       /*may_lack_metres=*/true, WarnOn(log));
+}
+
 // The surveyed points of the model; empty without a file. Throws ModelError if
 // there are too few to compare with: without known positions, a similarity is
 // fitted to them.
@@ -100,15 +110,19 @@ int Run(const ModelPaths& paths, const std::string& check_points_path,
   report.run.seed = common.random_seed;
 
   Model model = ReadInput(paths, common.log, &report.run);
+  options.adjustment.fixed = ReadFixedParts(paths, model, common.log);
   const Survey survey(ReadKnownPositions(paths, model, common.log),
                       paths.output_frame == "own", &model);
   options.adjustment.positions = survey.positions();
+  const DistanceSurvey distances(
+      ReadDistanceFile(paths, model, common.log),
+      options.adjustment.fixed.Any() ? 1 : survey.scale(), &model);
+  options.adjustment.distances = distances.distances();
 
   const std::vector<KnownPosition> check_points = ReadCheckPoints(
       check_points_path, model, !survey.positions().empty(), common.log);
   options.finds_precision =
       !paths.report_path.empty() || !paths.html_path.empty();
-  options.adjustment.fixed = ReadFixedParts(paths, model, common.log);
   Context context{num_threads};
   if (paths.write_on_interrupt) context.cancel = &DeferInterrupts();
   AdjustModelResult result =
@@ -119,6 +133,7 @@ int Run(const ModelPaths& paths, const std::string& check_points_path,
   report.check_points = survey.CompareCheckPoints(result.model, check_points);
   report.position_frame = survey.frame();
   report.is_in_position_frame = survey.is_in_own_frame();
+  report.distances = distances.Compare(result.model, report.summary);
 
   BeginPhase(common.log, "writing " + paths.output_path);
   const Timer write_timer;
@@ -156,6 +171,7 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
                 "as JSON");
   AddFixedPaths(&paths, &parser);
   AddPositionsPath(&paths, &parser);
+  AddDistancesPath(&paths.distances_path, &parser);
   std::string check_points_path;
   parser.AddPath("check_points_path", &check_points_path, false, "a file",
                  "Surveyed 3D points, lines of ID X Y Z, that have no say: the "
@@ -173,6 +189,7 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
       parser.IsGiven("BundleAdjustment.max_error_factor")) {
     parser.Refuse("positions_path", "with a cap");
     parser.Refuse("point_positions_path", "with a cap");
+    parser.Refuse("distances_path", "with a cap");
   }
   return Run(paths, check_points_path, common, options.Resolve(parser),
              options.num_threads());

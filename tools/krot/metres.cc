@@ -19,7 +19,7 @@ std::optional<DistanceReport> MeasureFile(
   report.distances = ReadDistances(ReadFileBytes(path), *models.front(),
                                    may_lack_metres, WarnOn(log));
   for (const KnownDistance& distance : report.distances) {
-    report.names.push_back(distance.Name(*models.front()));
+    report.names.push_back(NameOf(*models.front(), distance));
   }
   for (const Model* model : models) {
     report.models.push_back(MeasureDistances(
@@ -56,14 +56,10 @@ std::optional<DistanceReport> ReadKnownDistances(const ModelPaths& paths,
   const bool is_held =
       !paths.positions_path.empty() || !paths.point_positions_path.empty() ||
       !paths.fixed_images_path.empty() || !paths.fixed_points_path.empty();
-  if (is_held || !scale || scale->is_unique) return report;
-  throw ModelError(
-      paths.distances_path + ": found " +
-      Counted(static_cast<int64_t>(report->distances.size()), "distance") +
-      " that contradict each other, and several largest sets (of " +
-      std::to_string(scale->num_agreeing) +
-      ") that agree on a scale, expected one; take out what is wrong, or raise "
-      "tolerances");
+  if (!is_held && scale) {
+    RequireOneScale(paths.distances_path, report->distances.size(), *scale);
+  }
+  return report;
 }
 
 namespace {

@@ -260,6 +260,7 @@ std::vector<int> RefinedParams(int camera_model,
 AdjustmentColumns::AdjustmentColumns(const BundleAdjustmentOptions& options,
                                      const AdjustmentBlocks& blocks)
     : point_moves(blocks.points.size(), options.refine_points3D),
+      kept_points(blocks.points.size(), kHeld),
       frames(blocks.frames.size()),
       sensors(blocks.sensors.size()),
       cameras(blocks.cameras.size()) {
@@ -339,7 +340,7 @@ std::vector<AdjustmentComponent> FindComponents(const AdjustmentBlocks& blocks,
   const size_t num_nodes = num_frames + num_sensors + blocks.points.size();
   DisjointSets nodes(static_cast<int64_t>(num_nodes));
   std::vector<bool> is_used(num_nodes, false);
-  std::vector<bool> is_scaled(num_frames, false);
+  std::vector<bool> is_scaled(num_nodes, false);
   for (const AdjustmentObservation& observation : blocks.observations) {
     const size_t frame = observation.frame;
     const size_t point = num_frames + num_sensors + observation.point;
@@ -360,9 +361,15 @@ std::vector<AdjustmentComponent> FindComponents(const AdjustmentBlocks& blocks,
   for (size_t k = 0; k < blocks.points.size(); ++k) {
     is_held[num_frames + num_sensors + k] = blocks.point_is_fixed[k];
   }
+  const auto node_of = [&](const Place& place) {
+    return place.point >= 0 ? num_frames + num_sensors + place.point
+                            : size_t(place.frame);
+  };
   for (const PositionObservation& position : blocks.positions) {
-    is_held[position.point >= 0 ? num_frames + num_sensors + position.point
-                                : position.frame] = true;
+    is_held[node_of(position.of)] = true;
+  }
+  for (const DistanceObservation& distance : blocks.distances) {
+    if (distance.px_from_world > 0) is_scaled[node_of(distance.ends[0])] = true;
   }
 
   std::map<size_t, AdjustmentComponent> components;
@@ -370,9 +377,9 @@ std::vector<AdjustmentComponent> FindComponents(const AdjustmentBlocks& blocks,
     if (!is_used[node]) continue;
     AdjustmentComponent& component = components[nodes.Find(node)];
     component.is_held = component.is_held || is_held[node];
+    component.has_fixed_scale = component.has_fixed_scale || is_scaled[node];
     if (node < num_frames) {
       component.frames.push_back(node);
-      component.has_fixed_scale = component.has_fixed_scale || is_scaled[node];
     } else if (node < num_frames + num_sensors) {
       component.sensors.push_back(node - num_frames);
     } else {

@@ -37,15 +37,29 @@ struct AdjustmentObservation {
   uint64_t element = 0;  // in Model::track_elements
 };
 
-// A known position of a camera's centre or of a point: an observation of three
-// coordinates.
-struct PositionObservation {
-  int32_t frame = -1;   // in AdjustmentBlocks::frames; -1: of a point
+// The centre of a camera, or a point.
+struct Place {
+  int32_t frame = -1;   // in AdjustmentBlocks::frames; -1: a point
   int32_t sensor = -1;  // in sensors; -1: the rig's reference sensor
-  int32_t point = -1;   // in points; -1: of a camera
+  int32_t point = -1;   // in points; -1: a camera
+};
+
+// A known position: an observation of three coordinates.
+struct PositionObservation {
+  Place of;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   // Turns a difference in the world into one that has the noise of pixels.
   Eigen::Matrix3d px_from_world = Eigen::Matrix3d::Identity();
+};
+
+// A distance: one observation if it is known, else only asked for.
+struct DistanceObservation {
+  int32_t index = 0;  // in BundleAdjustmentOptions::distances
+  std::array<Place, 2> ends;
+  double length = 0;
+  // Turns a difference into one that has the noise of pixels; 0 if the length
+  // is not known.
+  double px_from_world = 0;
 };
 
 // The unknowns of bundle adjustment as flat blocks of doubles, in the order of
@@ -61,6 +75,7 @@ struct AdjustmentBlocks {
   double cap2 = std::numeric_limits<double>::infinity();
   std::vector<AdjustmentObservation> observations;  // point by point
   std::vector<PositionObservation> positions;
+  std::vector<DistanceObservation> distances;
   // Marks the blocks that must not move.
   std::vector<char> frame_is_fixed;
   std::vector<char> sensor_is_fixed;  // if a fixed frame sees through it
@@ -101,8 +116,8 @@ std::vector<int> RefinedParams(int camera_model,
                                const BundleAdjustmentOptions& options);
 
 // The unknowns that move. Apart from the points they are in blocks of three
-// columns, which are numbered in the order frames, sensors, cameras, cap.
-// Nothing moves that is fixed, or that has no observation.
+// columns, which are numbered in the order frames, sensors, cameras, points
+// that are kept, cap. Nothing moves that is fixed, or that has no observation.
 struct AdjustmentColumns {
   static constexpr int32_t kHeld = -1;
   // The blocks of theta and c, where x -> R exp([theta]x) (x - c).
@@ -125,14 +140,25 @@ struct AdjustmentColumns {
                     const AdjustmentBlocks& blocks);
 
   std::vector<char> point_moves;  // as AdjustmentBlocks::points
-  std::vector<Pose> frames;       // as AdjustmentBlocks::frames
-  std::vector<Pose> sensors;      // as sensors
+  // For each point kHeld, or its block: a point at which a distance ends is not
+  // eliminated, because the distance ties it to others.
+  std::vector<int32_t> kept_points;
+  std::vector<Pose> frames;   // as AdjustmentBlocks::frames
+  std::vector<Pose> sensors;  // as sensors
   std::vector<Camera> cameras;
   int32_t cap = kHeld;  // one column
   int32_t num_blocks = 0;
   int64_t num_unknowns = 0;  // including points, without the cap
 
   void AddCap() { cap = num_blocks++; }
+  void Keep(int32_t point) {
+    if (kept_points[point] == kHeld && point_moves[point] != 0) {
+      kept_points[point] = num_blocks++;
+    }
+  }
+  bool IsEliminated(int64_t point) const {
+    return point_moves[point] != 0 && kept_points[point] == kHeld;
+  }
 };
 
 // Adds the known positions of what moves. Throws std::invalid_argument if a
@@ -141,22 +167,42 @@ void AddPositions(const Model& model,
                   const std::vector<KnownPosition>& positions, double sigma_px,
                   const AdjustmentColumns& columns, AdjustmentBlocks* blocks);
 
-// Where the blocks place what the position is of.
-Eigen::Vector3d PlaceOf(const PositionObservation& position,
-                        const AdjustmentBlocks& blocks);
+// Adds the distances both of whose ends take part, in one component, and whose
+// length is not the same however they move. Keeps the points at which they end.
+void AddDistances(const Model& model, const BundleAdjustmentOptions& options,
+                  AdjustmentColumns* columns, AdjustmentBlocks* blocks);
 
-// Half the sum of the squared differences from all known positions, pixels^2.
-double HalfSquaredPositions(const AdjustmentBlocks& blocks);
+// Where the blocks have it.
+Eigen::Vector3d PositionOf(const Place& place, const AdjustmentBlocks& blocks);
 
-// The derivatives of a camera's rotation, about its own axes, and of its centre
-// by the blocks of columns that move it: 6 x 3 blocks.size().
-struct PoseJacobian {
+double LengthOf(const DistanceObservation& distance,
+                const AdjustmentBlocks& blocks);
+// The difference from the known length, in pixels.
+double ErrorPx(const DistanceObservation& distance,
+               const AdjustmentBlocks& blocks);
+
+// Half the sum of the squared differences from all known positions and
+// distances, pixels^2.
+double HalfSquaredSurvey(const AdjustmentBlocks& blocks);
+
+// Derivatives by blocks of columns, which may come more than once: J has 3
+// columns for each.
+struct BlockJacobian {
   std::vector<int32_t> blocks;
   Eigen::MatrixXd J;
 };
-PoseJacobian DifferentiatePose(const AdjustmentColumns& columns,
-                               const AdjustmentBlocks& blocks, int32_t frame,
-                               int32_t sensor);
+// Of a camera's rotation, about its own axes, and of its centre: 6 rows.
+BlockJacobian DifferentiatePose(const AdjustmentColumns& columns,
+                                const AdjustmentBlocks& blocks, int32_t frame,
+                                int32_t sensor);
+// Of a position, 3 rows, and of the length between two, one row. A point must
+// not be eliminated.
+BlockJacobian DifferentiatePosition(const AdjustmentColumns& columns,
+                                    const AdjustmentBlocks& blocks,
+                                    const Place& place);
+BlockJacobian DifferentiateLength(const AdjustmentColumns& columns,
+                                  const AdjustmentBlocks& blocks,
+                                  const std::array<Place, 2>& ends);
 
 // Sets the unknowns of `*to` to those of `from`, moved by `step` along a
 // direction of points and blocks. Unknowns that do not move keep their bits.
@@ -170,7 +216,8 @@ struct AdjustmentComponent {
   std::vector<size_t> frames;  // as the others, ascending
   std::vector<size_t> sensors;
   std::vector<size_t> points;
-  // Whether a sensor that is not refined has a translation.
+  // Whether a sensor that is not refined has a translation, or a distance is
+  // known.
   bool has_fixed_scale = false;
   bool is_held = false;  // something in it is fixed, or has a known position
 };

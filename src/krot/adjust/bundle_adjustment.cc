@@ -27,6 +27,8 @@ void CheckOptions(const BundleAdjustmentOptions& options) {
   CheckPositive(options.sigma_px.value_or(1), "sigma_px");
   CheckArgument(options.positions.empty() || options.sigma_px, "positions",
                 options.positions.size(), "none without sigma_px");
+  CheckArgument(options.distances.empty() || options.sigma_px, "distances",
+                options.distances.size(), "none without sigma_px");
   CheckAtLeast(0, options.max_num_iterations, "max_num_iterations");
   CheckAtLeast(1, options.max_linear_solver_iterations,
                "max_linear_solver_iterations");
@@ -47,6 +49,8 @@ void CheckOptions(const BundleAdjustmentOptions& options) {
                 static_cast<int>(options.loss), "trivial with a cap");
   CheckArgument(options.positions.empty(), "positions",
                 options.positions.size(), "none with a cap");
+  CheckArgument(options.distances.empty(), "distances",
+                options.distances.size(), "none with a cap");
 }
 
 std::unique_ptr<ceres::LossFunction> MakeLoss(
@@ -104,25 +108,29 @@ void Count(const AdjustmentBlocks& blocks, const AdjustmentColumns& columns,
   summary->num_short_track = blocks.num_short_track;
   summary->num_parameters = columns.num_unknowns;
   summary->num_positions = static_cast<int64_t>(blocks.positions.size());
+  for (const DistanceObservation& distance : blocks.distances) {
+    summary->num_distances += distance.px_from_world > 0 ? 1 : 0;
+  }
 }
 
 // Half the sum of the squared errors, with the loss if there is one, and of the
-// known positions'. None if an error is not finite or reaches the cap.
+// known positions' and distances'. None if an error is not finite or reaches
+// the cap.
 std::optional<double> RobustCost(const Context& context,
                                  const ceres::LossFunction* loss,
                                  const AdjustmentBlocks& blocks) {
   const auto errors =
       ProjectErrors(blocks, std::sqrt(blocks.cap2), context.num_threads);
   if (!errors) return std::nullopt;
-  const double of_positions = HalfSquaredPositions(blocks);
-  if (loss == nullptr) return HalfSquaredNorm(*errors) + of_positions;
+  const double of_survey = HalfSquaredSurvey(blocks);
+  if (loss == nullptr) return HalfSquaredNorm(*errors) + of_survey;
   double sum = 0;
   for (const ProjectedError& error : *errors) {
     double rho[3];
     loss->Evaluate(error.r.squaredNorm(), rho);
     sum += rho[0];
   }
-  return sum / 2 + of_positions;
+  return sum / 2 + of_survey;
 }
 
 // The options with a callback that also adds the iterations to the summary.
@@ -179,9 +187,12 @@ BundleAdjustmentResult AdjustBundle(
   const Timer timer;
   AdjustmentBlocks before =
       MakeAdjustmentBlocks(model, options.min_track_length, options.fixed);
-  const AdjustmentColumns columns(options, before);
+  AdjustmentColumns columns(options, before);
   if (!options.positions.empty()) {
     AddPositions(model, options.positions, *options.sigma_px, columns, &before);
+  }
+  if (!options.distances.empty()) {
+    AddDistances(model, options, &columns, &before);
   }
   AdjustmentBlocks blocks = before;
 

@@ -18,10 +18,10 @@ namespace krot::internal {
 // say it [Foerstner, Wrobel, Photogrammetric Computer Vision, 2016, Ch. 4].
 //
 // With J the derivatives of all errors by all u unknowns, at the least squares
-// of n observations of two coordinates each and of m known positions, whose
-// errors are in pixels, too:
+// of n observations of two coordinates each and of m known positions and d
+// known distances, whose errors are in pixels, too:
 //
-//   redundancy  r = 2 n + 3 m - rank J
+//   redundancy  r = 2 n + 3 m + d - rank J
 //   sigma0^2    = sum |error|^2 / r
 //   covariance  C = sigma0^2 S (J'J)^- S'
 //   R           = I - J (J'J)^- J', whose trace is r: what shows of noise
@@ -81,11 +81,22 @@ struct PointPrecision {
   Eigen::Vector3d sigma = Eigen::Vector3d::Constant(kNaN);
 };
 
+struct DistancePrecision {
+  int32_t distance = 0;  // in BundleAdjustmentOptions::distances
+  double length = 0;
+  double sigma = kNaN;  // of the length; infinite if it is not determined
+  // Of a known distance: its redundancy number; NaN if unknown.
+  double redundancy = kNaN;
+  // The difference from the known length over its standard deviation.
+  double w = kNaN;
+};
+
 struct AdjustmentPrecision {
   AdjustmentDatum datum = AdjustmentDatum::kCameras;
   // Whether what was adjusted is the least squares, without a loss or a cap.
   bool is_least_squares = true;
   int64_t num_positions = 0;  // known ones that took part
+  int64_t num_distances = 0;  // known ones that took part
   int64_t num_unknowns = 0;
   int64_t datum_defect = 0;
   // Unknowns, beyond the datum, that no observation determines. Unknown without
@@ -95,9 +106,10 @@ struct AdjustmentPrecision {
   double sigma0_px = kNaN;  // NaN without redundancy
   bool has_covariances = false;
   std::vector<ObservationPrecision> observations;  // as in AdjustmentBlocks
-  std::vector<ImagePrecision> images;    // with observations, ascending
-  std::vector<CameraPrecision> cameras;  // with refined parameters
-  std::vector<PointPrecision> points;    // with observations, ascending
+  std::vector<ImagePrecision> images;        // with observations, ascending
+  std::vector<CameraPrecision> cameras;      // with refined parameters
+  std::vector<PointPrecision> points;        // with observations, ascending
+  std::vector<DistancePrecision> distances;  // known and others
 };
 
 struct BundleAdjustmentResult {

@@ -6,12 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include <ceres/autodiff_cost_function.h>
 #include <ceres/crs_matrix.h>
 #include <ceres/manifold.h>
-#include <ceres/normal_prior.h>
 #include <ceres/product_manifold.h>
-#include <ceres/rotation.h>
 #include <Eigen/Geometry>
 
 #include "krot/adjust/adjustment_blocks.h"
@@ -163,57 +160,6 @@ bool ReprojectionCost::Evaluate(double const* const* blocks, double* residuals,
   return residual.allFinite();
 }
 
-namespace {
-
-// The difference of a camera's centre from its known position, in pixels.
-// Blocks: rig_from_world and, with a sensor, sensor_from_rig.
-struct CenterCost {
-  PositionObservation position;
-
-  template <typename T>
-  bool operator()(const T* frame, const T* sensor, T* residual) const {
-    Eigen::Matrix<T, 3, 1> x = Eigen::Matrix<T, 3, 1>::Zero();
-    for (const T* pose : {sensor, frame}) {
-      if (pose == nullptr) continue;
-      const T inverse[4] = {pose[0], -pose[1], -pose[2], -pose[3]};
-      const T from[3] = {x[0] - pose[4], x[1] - pose[5], x[2] - pose[6]};
-      ceres::UnitQuaternionRotatePoint(inverse, from, x.data());
-    }
-    Eigen::Map<Eigen::Matrix<T, 3, 1>> r(residual);
-    r = position.px_from_world.cast<T>() * (x - position.position.cast<T>());
-    return true;
-  }
-  template <typename T>
-  bool operator()(const T* frame, T* residual) const {
-    return (*this)(frame, static_cast<const T*>(nullptr), residual);
-  }
-};
-
-// Positions weigh in full, whatever the loss.
-void AddPositionBlocks(AdjustmentBlocks* blocks, ceres::Problem* problem) {
-  for (const PositionObservation& position : blocks->positions) {
-    if (position.point >= 0) {
-      problem->AddResidualBlock(
-          new ceres::NormalPrior(position.px_from_world, position.position),
-          nullptr, blocks->points[position.point].data());
-      continue;
-    }
-    double* const frame = blocks->frames[position.frame].data();
-    auto* const cost = new CenterCost{position};
-    if (position.sensor < 0) {
-      problem->AddResidualBlock(
-          new ceres::AutoDiffCostFunction<CenterCost, 3, 7>(cost), nullptr,
-          frame);
-    } else {
-      problem->AddResidualBlock(
-          new ceres::AutoDiffCostFunction<CenterCost, 3, 7, 7>(cost), nullptr,
-          frame, blocks->sensors[position.sensor].data());
-    }
-  }
-}
-
-}  // namespace
-
 ceres::Problem::Options AdjustmentProblemOptions() {
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -236,7 +182,7 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
                              observation.sensor >= 0, observation.pixel),
         loss, parameters);
   }
-  AddPositionBlocks(blocks, problem);
+  AddSurveyBlocks(blocks, problem);
   for (size_t f = 0; f < blocks->frames.size(); ++f) {
     ParameterizePose(
         options.refine_rig_from_world && !blocks->frame_is_fixed[f],
@@ -296,17 +242,26 @@ ceres::Solver::Options AdjustmentSolverOptions(
     solver.preconditioner_type = ceres::SCHUR_JACOBI;
   }
   // One group per camera, because within a group Ceres orders blocks by their
-  // addresses, which differ from run to run for separate vectors.
+  // addresses, which differ from run to run for separate vectors. Points at
+  // which distances end cannot be eliminated one by one.
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   const auto add = [&](double* block, int group) {
     if (problem.HasParameterBlock(block)) {
       ordering->AddElementToGroup(block, group);
     }
   };
-  for (Eigen::Vector3d& point : blocks->points) add(point.data(), 0);
+  std::vector<char> is_end(blocks->points.size(), 0);
+  for (const DistanceObservation& distance : blocks->distances) {
+    for (const Place& end : distance.ends) {
+      if (end.point >= 0) is_end[end.point] = 1;
+    }
+  }
+  for (size_t k = 0; k < blocks->points.size(); ++k) {
+    add(blocks->points[k].data(), is_end[k] != 0 ? 3 : 0);
+  }
   for (PoseBlock& frame : blocks->frames) add(frame.data(), 1);
   for (PoseBlock& sensor : blocks->sensors) add(sensor.data(), 2);
-  int group = 3;
+  int group = 4;
   for (std::vector<double>& camera : blocks->cameras) {
     add(camera.data(), group++);
   }

@@ -38,12 +38,14 @@ class ReprojectionCost final : public ceres::CostFunction {
 };
 
 // Adds every observation of `blocks`, in their order, and every known position
-// to a problem that does not own the loss, and makes constant what the options
-// do not refine. `loss` may be null. The blocks are solved in place and must
-// outlive the problem.
+// and distance to a problem that does not own the loss, and makes constant what
+// the options do not refine. `loss` may be null. The blocks are solved in place
+// and must outlive the problem.
 void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
                             ceres::LossFunction* loss, AdjustmentBlocks* blocks,
                             ceres::Problem* problem);
+// The known positions and distances, which weigh in full, whatever the loss.
+void AddSurveyBlocks(AdjustmentBlocks* blocks, ceres::Problem* problem);
 
 // The options for such a problem, which does not own the loss.
 ceres::Problem::Options AdjustmentProblemOptions();

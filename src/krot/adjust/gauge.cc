@@ -2,13 +2,11 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include "krot/adjust/precision_system.h"
 #include "krot/base/numbers.h"
 #include "krot/geometry.h"
 #include "krot/geometry/transform.h"
+#include "krot/linear/small_matrices.h"
 
 namespace krot::internal {
 namespace {
@@ -64,8 +62,8 @@ class Motion {
     return rows;
   }
 
-  // visit(block or kHeld, rows, whether a length) for everything but the
-  // points.
+  // visit(block or kHeld, rows, whether a length) for everything but the points
+  // that are held or eliminated.
   template <typename Visit>
   void ForEachBlock(const Visit& visit) const {
     for (size_t n = 0; n < component_.frames.size(); ++n) {
@@ -77,6 +75,10 @@ class Motion {
     for (const size_t s : component_.sensors) {
       const AdjustmentColumns::Pose& pose = columns_.sensors[s];
       visit(pose.center, OfBaseline(CenterOf(blocks_.sensors[s])), true);
+    }
+    for (const size_t k : component_.points) {
+      if (columns_.kept_points[k] == AdjustmentColumns::kHeld) continue;
+      visit(columns_.kept_points[k], OfPlace(blocks_.points[k]), true);
     }
   }
 
@@ -94,24 +96,24 @@ class Motion {
       if (!columns_.point_moves[k]) hold(OfPlace(blocks_.points[k]), true);
     }
     for (const PositionObservation& position : blocks_.positions) {
-      const bool is_point = position.point >= 0;
+      const Place& place = position.of;
+      const bool is_point = place.point >= 0;
       const std::vector<size_t>& parts =
           is_point ? component_.points : component_.frames;
       const auto part =
-          static_cast<size_t>(is_point ? position.point : position.frame);
+          static_cast<size_t>(is_point ? place.point : place.frame);
       if (std::binary_search(parts.begin(), parts.end(), part)) {
-        hold(OfPlace(PlaceOf(position, blocks_)), true);
+        hold(OfPlace(PositionOf(place, blocks_)), true);
       }
     }
     if (component_.has_fixed_scale) gram(6, 6) += 1;
     if (gram.isZero(0)) return MatrixXd::Identity(7, 7);
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
+    const Eigenpairs eigen = EigenpairsOf(gram);
     Index count = 0;
-    while (count < 7 &&
-           eigen.eigenvalues()[count] <= kNothing * eigen.eigenvalues()[6]) {
+    while (count < 7 && eigen.values[count] <= kNothing * eigen.values[6]) {
       ++count;
     }
-    return eigen.eigenvectors().leftCols(count);
+    return eigen.vectors.leftCols(count);
   }
 
   // Adds what the datum holds, for blocks and for points: 7 columns, lengths in
@@ -122,6 +124,11 @@ class Motion {
       for (size_t n = 0; n < points.size(); ++n) {
         held_points->middleRows<3>(static_cast<Index>(3 * n)) =
             OfPlace(blocks_.points[points[n]]) / (unit_ * unit_);
+      }
+      for (const size_t k : component_.points) {
+        if (columns_.kept_points[k] == AdjustmentColumns::kHeld) continue;
+        held_blocks->middleRows<3>(3 * columns_.kept_points[k]) =
+            OfPlace(blocks_.points[k]) / (unit_ * unit_);
       }
     } else if (datum == AdjustmentDatum::kFirstCamera) {
       HoldFirst(held_blocks);
@@ -187,21 +194,20 @@ ComponentGauge GaugeOf(const AdjustmentColumns& columns,
   // A motion that moves points alone is no gauge: these points are not
   // determined.
   MatrixXd moves = similar * free;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(moves.transpose() *
-                                                      moves);
+  const Eigenpairs eigen = EigenpairsOf(moves.transpose() * moves);
   Index none = 0;
   while (none < free.cols() &&
-         eigen.eigenvalues()[none] <=
-             kNothing * eigen.eigenvalues()[free.cols() - 1]) {
+         eigen.values[none] <= kNothing * eigen.values[free.cols() - 1]) {
     ++none;
   }
   const bool is_whole = none == 0 && free.cols() == 7;
   const MatrixXd basis =
-      is_whole ? free
-               : free * eigen.eigenvectors().rightCols(free.cols() - none);
+      is_whole ? free : free * eigen.vectors.rightCols(free.cols() - none);
   gauge.blocks = similar * basis;
   for (const size_t k : component.points) {
-    if (columns.point_moves[k]) gauge.points.push_back(static_cast<int32_t>(k));
+    if (columns.IsEliminated(static_cast<int64_t>(k))) {
+      gauge.points.push_back(static_cast<int32_t>(k));
+    }
   }
   gauge.of_points.resize(3 * static_cast<Index>(gauge.points.size()),
                          basis.cols());
@@ -224,7 +230,7 @@ ComponentGauge GaugeOf(const AdjustmentColumns& columns,
     gauge.held_points = held_points * basis;
     const MatrixXd held = gauge.held_blocks.transpose() * gauge.blocks +
                           gauge.held_points.transpose() * gauge.of_points;
-    if (Eigen::FullPivLU<MatrixXd>(held).rcond() > kNothing) break;
+    if (InverseOf(held).rcond > kNothing) break;
   }
   return gauge;
 }

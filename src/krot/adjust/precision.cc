@@ -67,10 +67,14 @@ class PrecisionOfAdjustment {
       result_.num_undetermined = covariance_->num_undetermined();
     }
     result_.num_positions = static_cast<int64_t>(blocks_.positions.size());
+    for (const DistanceObservation& distance : blocks_.distances) {
+      result_.num_distances += distance.px_from_world > 0 ? 1 : 0;
+    }
     result_.redundancy = 2 * static_cast<int64_t>(blocks_.observations.size()) +
-                         3 * result_.num_positions - result_.num_unknowns +
-                         result_.datum_defect + result_.num_undetermined;
-    squared_error_ += 2 * HalfSquaredPositions(blocks_);
+                         3 * result_.num_positions + result_.num_distances -
+                         result_.num_unknowns + result_.datum_defect +
+                         result_.num_undetermined;
+    squared_error_ += 2 * HalfSquaredSurvey(blocks_);
     if (result_.redundancy > 0) {
       result_.sigma0_px =
           std::sqrt(squared_error_ / static_cast<double>(result_.redundancy));
@@ -80,6 +84,7 @@ class PrecisionOfAdjustment {
       DescribeImages();
       DescribeCameras();
     }
+    DescribeDistances();
     return std::move(result_);
   }
 
@@ -181,7 +186,7 @@ class PrecisionOfAdjustment {
 
   void DescribeImages() {
     for (size_t n = 0; n < parts_.size(); ++n) {
-      const PoseJacobian pose = DifferentiatePose(
+      const BlockJacobian pose = DifferentiatePose(
           columns_, blocks_, parts_[n].frame, parts_[n].sensor);
       const auto covariance = CovarianceOf(pose.J, pose.blocks);
       if (covariance) result_.images[n].covariance = *covariance;
@@ -199,6 +204,29 @@ class PrecisionOfAdjustment {
           MatrixXd::Identity(count, 3 * Index{camera.num_blocks()});
       result_.cameras.push_back(
           {static_cast<int32_t>(c), camera.params, CovarianceOf(J, blocks)});
+    }
+  }
+
+  void DescribeDistances() {
+    for (const DistanceObservation& of : blocks_.distances) {
+      result_.distances.push_back({of.index, LengthOf(of, blocks_)});
+      if (!covariance_) continue;
+      DistancePrecision& distance = result_.distances.back();
+      const BlockJacobian length =
+          DifferentiateLength(columns_, blocks_, of.ends);
+      const auto variance = covariance_->Covariance(length.J, length.blocks);
+      distance.sigma =
+          variance ? std::sqrt(std::max(Variance() * (*variance)(0, 0), 0.0))
+                   : kInfinity;
+      if (of.px_from_world > 0 && variance) {
+        distance.redundancy = std::clamp(
+            1 - of.px_from_world * of.px_from_world * (*variance)(0, 0), 0.0,
+            1.0);
+        if (Variance() > 0 && distance.redundancy >= kControlled) {
+          distance.w = ErrorPx(of, blocks_) /
+                       std::sqrt(distance.redundancy * Variance());
+        }
+      }
     }
   }
 

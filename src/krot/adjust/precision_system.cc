@@ -1,8 +1,7 @@
 #include "krot/adjust/precision_system.h"
 
-#include <Eigen/LU>
-
 #include "krot/linear/blocks.h"
+#include "krot/linear/small_matrices.h"
 
 namespace krot::internal {
 namespace {
@@ -33,8 +32,8 @@ void TakeOffGauge(const MatrixXd& gauge, MatrixXd* motions) {
       for (Index n = 0; n < gauge.rows(); n += 3) {
         weighted.middleRows<3>(n) /= motion.segment<3>(n).norm() + still;
       }
-      const Eigen::FullPivLU<MatrixXd> lu(weighted.transpose() * gauge);
-      motion -= gauge * lu.solve(weighted.transpose() * motion);
+      motion -= gauge * (InverseOf(weighted.transpose() * gauge).matrix *
+                         (weighted.transpose() * motion));
     }
   }
 }
@@ -60,7 +59,10 @@ BlockCovariance::BlockCovariance(const AdjustmentColumns& columns,
     }
   }
   for (const PositionObservation& position : blocks.positions) {
-    if (position.point >= 0) position_of_[position.point] = &position;
+    const int32_t point = position.of.point;
+    if (point >= 0 && columns.IsEliminated(point)) {
+      position_of_[point] = &position;
+    }
   }
   jacobians_.Evaluate(blocks, num_threads);
   Reduce(blocks);
@@ -75,7 +77,7 @@ void BlockCovariance::Reduce(const AdjustmentBlocks& blocks) {
   for (int64_t k = 0; k < num_points; ++k) {
     if (begin_[k] == begin_[k + 1]) continue;
     const TrackRows rows = RowsOf(k);
-    if (columns_.point_moves[k]) num_undetermined_ += rows.NumUndetermined();
+    if (columns_.IsEliminated(k)) num_undetermined_ += rows.NumUndetermined();
     for (int64_t i = rows.begin(); i < rows.end(); ++i) {
       const int32_t* own = jacobians_.blocks(i);
       for (int a = 0; a < rows.num_blocks(i); ++a) {
@@ -97,19 +99,28 @@ void BlockCovariance::Reduce(const AdjustmentBlocks& blocks) {
     }
   }
   for (const PositionObservation& position : blocks.positions) {
-    if (position.point >= 0) continue;
-    const PoseJacobian pose =
-        DifferentiatePose(columns_, blocks, position.frame, position.sensor);
-    const MatrixXd J = position.px_from_world * pose.J.bottomRows<3>();
-    for (size_t a = 0; a < pose.blocks.size(); ++a) {
-      const Matrix3d J_a = J.middleCols<3>(static_cast<Index>(3 * a));
-      scale_.segment<3>(3 * Index{pose.blocks[a]}) +=
-          J_a.colwise().squaredNorm().transpose();
-      for (size_t b = 0; b < pose.blocks.size(); ++b) {
-        AddToBlocks(
-            pose.blocks[a], pose.blocks[b],
-            J_a.transpose() * J.middleCols<3>(static_cast<Index>(3 * b)));
-      }
+    const int32_t point = position.of.point;
+    if (point >= 0 && columns_.IsEliminated(point)) continue;
+    const BlockJacobian of =
+        DifferentiatePosition(columns_, blocks, position.of);
+    AddRows(of.blocks, position.px_from_world * of.J);
+  }
+  for (const DistanceObservation& distance : blocks.distances) {
+    const BlockJacobian of =
+        DifferentiateLength(columns_, blocks, distance.ends);
+    AddRows(of.blocks, distance.px_from_world * of.J);
+  }
+}
+
+void BlockCovariance::AddRows(const std::vector<int32_t>& blocks,
+                              const MatrixXd& J) {
+  for (size_t a = 0; a < blocks.size(); ++a) {
+    const auto J_a = J.middleCols<3>(static_cast<Index>(3 * a));
+    scale_.segment<3>(3 * Index{blocks[a]}) +=
+        J_a.colwise().squaredNorm().transpose();
+    for (size_t b = 0; b < blocks.size(); ++b) {
+      AddToBlocks(blocks[a], blocks[b],
+                  J_a.transpose() * J.middleCols<3>(static_cast<Index>(3 * b)));
     }
   }
 }
@@ -131,8 +142,8 @@ void BlockCovariance::Invert() {
   }
   for (const ComponentGauge& gauge : gauges_) {
     const MatrixXd moves = scale_.cwiseInverse().asDiagonal() * gauge.blocks;
-    const Eigen::FullPivLU<MatrixXd> lu(moves.transpose() * moves);
-    C_.noalias() += moves * lu.solve(moves.transpose());
+    C_.noalias() += moves * (InverseOf(moves.transpose() * moves).matrix *
+                             moves.transpose());
   }
   MatrixXd motions = InvertSemidefinite(num_threads_, &C_);
   num_undetermined_ += motions.cols();
@@ -175,16 +186,18 @@ void BlockCovariance::HoldDetermined(const ComponentGauge& gauge,
     if (IsDetermined(RowsOf(gauge.points[n]))) continue;
     held_points->middleRows<3>(static_cast<Index>(3 * n)).setZero();
   }
-  Eigen::FullPivLU<MatrixXd> lu(gauge.blocks.transpose() * *held_blocks +
-                                gauge.of_points.transpose() * *held_points);
-  if (!lu.isInvertible()) {  // Nothing of it is determined: use all of B.
+  const auto invert = [&] {
+    return InverseOf(gauge.blocks.transpose() * *held_blocks +
+                     gauge.of_points.transpose() * *held_points);
+  };
+  LuInverse inverse = invert();
+  if (!inverse.exists) {  // Nothing of it is determined: use all of B.
     *held_blocks = gauge.held_blocks;
     *held_points = gauge.held_points;
-    lu.compute(gauge.blocks.transpose() * *held_blocks +
-               gauge.of_points.transpose() * *held_points);
+    inverse = invert();
   }
-  *held_blocks *= lu.inverse();
-  *held_points *= lu.inverse();
+  *held_blocks *= inverse.matrix;
+  *held_points *= inverse.matrix;
 }
 
 void BlockCovariance::TakeDatum() {
@@ -284,6 +297,12 @@ Matrix2d PointCovariance::RedundancyOf(int64_t i) const {
 
 std::optional<Matrix3d> PointCovariance::OfPoint() const {
   if (!all_.columns_.point_moves[k_]) return Matrix3d::Zero();
+  const int32_t block = all_.columns_.kept_points[k_];
+  if (block != AdjustmentColumns::kHeld) {
+    const auto of_block = all_.Covariance(Matrix3d::Identity(), {block});
+    if (!of_block) return std::nullopt;
+    return Matrix3d(*of_block);
+  }
   if (!all_.IsDetermined(rows_)) return std::nullopt;
   // R^-1 (I + G C G') R^-T
   Matrix3d covariance =

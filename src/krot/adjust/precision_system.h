@@ -26,8 +26,8 @@ class TrackRows {
   using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
   // Takes observations begin, ..., end - 1; `position` may be null. Keeps a
-  // reference to the derivatives. A point that does not move has Q = 0.
-  TrackRows(const ErrorJacobians& jacobians, bool moves, int64_t begin,
+  // reference to the derivatives. A point that is not eliminated has Q = 0.
+  TrackRows(const ErrorJacobians& jacobians, bool eliminates, int64_t begin,
             int64_t end, const PositionObservation* position)
       : jacobians_(jacobians),
         begin_(begin),
@@ -36,7 +36,7 @@ class TrackRows {
     for (int64_t i = begin; i < end; ++i) {
       for (int r = 0; r < 2; ++r) {
         for (int c = 0; c < 3; ++c) {
-          Q_.push_back(moves ? jacobians.by_point(i)(r, c) : 0);
+          Q_.push_back(eliminates ? jacobians.by_point(i)(r, c) : 0);
         }
       }
     }
@@ -137,8 +137,8 @@ std::vector<ComponentGauge> FindGauges(const BundleAdjustmentOptions& options,
 
 // ---- Covariances, for noise of one pixel ----
 
-// The covariance of all unknowns besides the points, by inverting their reduced
-// camera system,
+// The covariance of all unknowns besides the points that are eliminated, by
+// inverting their reduced camera system,
 //
 //   C = (sum F'F - G'G)^-,   x_k = R^-1 (Q'r - G t) for the point,
 //
@@ -170,6 +170,7 @@ class BlockCovariance {
   };
 
   void Reduce(const AdjustmentBlocks& blocks);
+  void AddRows(const std::vector<int32_t>& blocks, const Eigen::MatrixXd& J);
   void AddToBlocks(int32_t a, int32_t b, const Eigen::Matrix3d& block) {
     C_.block<3, 3>(3 * Eigen::Index{a}, 3 * Eigen::Index{b}) += block;
   }
@@ -179,7 +180,7 @@ class BlockCovariance {
                       Eigen::MatrixXd* held_points) const;
   bool IsDetermined(const TrackRows& rows) const;  // the point
   TrackRows RowsOf(int64_t k) const {
-    return {jacobians_, columns_.point_moves[k] != 0, begin_[k], begin_[k + 1],
+    return {jacobians_, columns_.IsEliminated(k), begin_[k], begin_[k + 1],
             position_of_[k]};
   }
   Eigen::MatrixXd TimesG(const TrackRows& rows) const;  // C G'
@@ -190,7 +191,8 @@ class BlockCovariance {
   const Eigen::Index size_;
   ErrorJacobians jacobians_;
   std::vector<int64_t> begin_;  // of points' observations; num_points + 1
-  std::vector<const PositionObservation*> position_of_;  // points; null: none
+  // For each point that is eliminated its position, or null.
+  std::vector<const PositionObservation*> position_of_;
   // For each point its gauge, -1: none, and its place among the gauge's points.
   std::vector<std::pair<int, Eigen::Index>> gauge_of_;
   Eigen::VectorXd scale_;  // of unknowns: units in which diagonals are 1

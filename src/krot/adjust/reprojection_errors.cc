@@ -216,6 +216,7 @@ ErrorJacobians::ErrorJacobians(const AdjustmentColumns& columns,
     for (int32_t n = 0; n < camera.num_blocks(); ++n) {
       add(camera.first_block + n);
     }
+    add(columns.kept_points[observation.point]);
     add(columns.cap);
   }
   begin_.push_back(static_cast<int64_t>(blocks_.size()));
@@ -263,6 +264,9 @@ void ErrorJacobians::Evaluate(const AdjustmentBlocks& blocks, int num_threads) {
                 by_sensor);
     }
     by_point->noalias() = D_rig * frame.transform.rotation;
+    if (columns_.kept_points[o.point] != kHeld) {
+      D[columns_.cameras[o.camera].num_blocks()] = *by_point;
+    }
     StorePose(frame_columns, *by_point, x - frame.center, by_frame);
   };
   ParallelForEach(

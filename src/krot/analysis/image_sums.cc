@@ -11,6 +11,7 @@
 #include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/geometry/transform.h"
+#include "krot/linear/small_matrices.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {
@@ -21,7 +22,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 using Matrix26 = Eigen::Matrix<double, 2, 6>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 // For smaller lambda the density is nearly even, and a series replaces formulas
@@ -57,14 +57,14 @@ void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
 void Solve(ImageSums* sums) {
   Vector6 scale = sums->M.diagonal().cwiseSqrt();
   for (double& s : scale) s = s > 0 ? 1 / s : 0;
-  const Eigen::SelfAdjointEigenSolver<Matrix6> of_M(
-      scale.asDiagonal() * sums->M * scale.asDiagonal());
-  Vector6 y = of_M.eigenvectors().transpose() * scale.cwiseProduct(sums->g);
+  const Eigenpairs of_M =
+      EigenpairsOf(scale.asDiagonal() * sums->M * scale.asDiagonal());
+  Vector6 y = of_M.vectors.transpose() * scale.cwiseProduct(sums->g);
   for (int j = 0; j < 6; ++j) {
-    const double value = of_M.eigenvalues()[j];
+    const double value = of_M.values[j];
     y[j] = value > 1e-9 ? -y[j] / value : 0;
   }
-  sums->step = scale.cwiseProduct(of_M.eigenvectors() * y);
+  sums->step = scale.cwiseProduct(of_M.vectors * y);
 }
 
 // 1 / sqrt of the smallest eigenvalue of A - B C^-1 B'; infinite if nothing

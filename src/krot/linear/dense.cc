@@ -5,11 +5,14 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 #include "krot/base/parallel_for.h"
 #include "krot/base/vector_units.h"
 #include "krot/linear/blocks.h"
 #include "krot/linear/native_kernels.h"
+#include "krot/linear/small_matrices.h"
 
 namespace krot::internal {
 
@@ -213,6 +216,16 @@ MatrixXd InvertSemidefinite(int num_threads, MatrixXd* matrix) {
     }
   }
   return motions;
+}
+
+Eigenpairs EigenpairsOf(const MatrixXd& A) {
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(A);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+LuInverse InverseOf(const MatrixXd& A) {
+  const Eigen::FullPivLU<MatrixXd> lu(A);
+  return {lu.isInvertible(), lu.inverse(), lu.rcond()};
 }
 
 }  // namespace krot::internal

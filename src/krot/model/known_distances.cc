@@ -12,13 +12,13 @@
 
 namespace krot::internal {
 
-std::string KnownDistance::Name(const Model& model) const {
-  const auto name = [&](const End& end) {
+std::string NameOf(const Model& model, const KnownDistance& distance) {
+  const auto name = [&](const KnownDistance::End& end) {
     return end.is_image
                ? model.images[end.index].name
                : "3D point " + std::to_string(model.points3D[end.index].id);
   };
-  return name(ends[0]) + " to " + name(ends[1]);
+  return name(distance.ends[0]) + " to " + name(distance.ends[1]);
 }
 
 std::vector<KnownDistance> ReadDistances(const FileBytes& file,
@@ -89,6 +89,17 @@ std::vector<double> LengthsOf(const Model& model,
         (place(distance.ends[1]) - place(distance.ends[0])).norm());
   }
   return lengths;
+}
+
+void RequireOneScale(const std::string& where, size_t count,
+                     const DistanceScale& scale) {
+  if (scale.is_unique) return;
+  throw ModelError(
+      where + ": found " + std::to_string(count) +
+      " distances that contradict each other, and several largest sets (of " +
+      std::to_string(scale.num_agreeing) +
+      ") that agree on a scale, expected one; take out what is wrong, or raise "
+      "tolerances");
 }
 
 MeasuredDistances MeasureDistances(const Model& model,

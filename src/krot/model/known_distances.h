@@ -14,20 +14,8 @@
 
 namespace krot::internal {
 
-// The distance between two cameras, two points, or one of each, and its true
-// length if that is known.
-struct KnownDistance {
-  struct End {
-    bool is_image = false;
-    int32_t index = 0;  // in Model::images or Model::points3D
-  };
-  std::array<End, 2> ends;
-  std::optional<double> metres;  // > 0
-  double tolerance = 0;          // metres; > 0 if `metres` is known
-
-  // "a.jpg to b.jpg", "3D point 12 to 3D point 7".
-  std::string Name(const Model& model) const;
-};
+// "a.jpg to b.jpg", "3D point 12 to 3D point 7".
+std::string NameOf(const Model& model, const KnownDistance& distance);
 
 // Reads the distances that a text file lists (scale bars: docs/formats.md). A
 // line holds two image names or ids of 3D points, and behind them METRES and
@@ -73,6 +61,11 @@ struct DistanceScale {
 std::optional<DistanceScale> FindScale(
     const std::vector<double>& lengths,
     const std::vector<KnownDistance>& distances);
+
+// Throws ModelError, which begins with `where`, unless the scale of `count`
+// distances is unique.
+void RequireOneScale(const std::string& where, size_t count,
+                     const DistanceScale& scale);
 
 // The known distances as one model has them.
 struct MeasuredDistances {

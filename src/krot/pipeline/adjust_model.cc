@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "krot/base/check.h"
+#include "krot/base/numbers.h"
 #include "krot/check.h"
 #include "krot/model/derived_models.h"
+#include "krot/model/known_distances.h"
 
 namespace krot::internal {
 namespace {
@@ -79,32 +81,84 @@ std::optional<Model> BoundedStart(const Model& model,
   return std::move(start.model);
 }
 
-// Finds the noise beside which known positions weigh, adjustment->sigma_px:
-// that of the model that is adjusted with it. Returns this model, and the
-// course so far, whose iterations are taken off what is allowed.
-Model WeighPositions(const Model& model, const Context& context,
-                     BundleAdjustmentOptions* adjustment,
-                     BundleAdjustmentSummary* course) {
+// Finds the noise beside which known positions and distances weigh,
+// adjustment->sigma_px: that of the model that is adjusted with the positions.
+// Returns this model, and the course so far, whose iterations are taken off
+// what is allowed.
+Model WeighKnown(const Model& model, const Context& context,
+                 BundleAdjustmentOptions* adjustment,
+                 BundleAdjustmentSummary* course) {
   constexpr int kMaxRounds = 5;
   constexpr double kSame = 0.02;  // of sigma
   const auto noise_of = [&](const Model& of) {
     return EstimateNoise(of, {}, context).sigma_px.value_or(1);
   };
-  adjustment->sigma_px = noise_of(model);
+  const int max_rounds =
+      adjustment->sigma_px || adjustment->positions.empty() ? 1 : kMaxRounds;
+  const bool finds_noise = !adjustment->sigma_px;
+  if (finds_noise) adjustment->sigma_px = noise_of(model);
+  BundleAdjustmentOptions without_distances = *adjustment;
+  without_distances.distances.clear();
   Model adjusted = model;
-  for (int round = 0; round < kMaxRounds; ++round) {
+  for (int round = 0; round < max_rounds; ++round) {
+    without_distances.sigma_px = adjustment->sigma_px;
+    without_distances.max_num_iterations = adjustment->max_num_iterations;
     BundleAdjustmentResult result =
-        AdjustBundle(adjusted, *adjustment, context);
+        AdjustBundle(adjusted, without_distances, context);
     adjusted = std::move(result.model);
     adjustment->max_num_iterations -= result.summary.num_iterations;
     AddEarlier(std::move(*course), &result.summary);
     *course = std::move(result.summary);
     if (context.IsCancelled() || adjustment->max_num_iterations <= 0) break;
+    if (!finds_noise) break;
     const double before = *adjustment->sigma_px;
     adjustment->sigma_px = noise_of(adjusted);
     if (std::abs(*adjustment->sigma_px - before) <= kSame * before) break;
   }
   return adjusted;
+}
+
+// Finds the distances that contradict the model, or each other where they alone
+// give it a scale: by more than the tolerance and three standard deviations of
+// the length in a model that is adjusted without them, where these are known.
+// Their lengths count as unknown from then on.
+std::vector<char> LeaveOutWrongDistances(const Model& model,
+                                         const Context& context,
+                                         BundleAdjustmentOptions* adjustment) {
+  BundleAdjustmentOptions of_lengths = *adjustment;
+  of_lengths.max_num_iterations = 0;
+  for (KnownDistance& distance : of_lengths.distances) distance.metres.reset();
+  std::optional<AdjustmentPrecision> precision;
+  AdjustBundle(model, of_lengths, context, AdjustmentDatum::kCameras,
+               &precision);
+  if (precision) {
+    for (const DistancePrecision& of : precision->distances) {
+      KnownDistance& distance = of_lengths.distances[of.distance];
+      const KnownDistance& known = adjustment->distances[of.distance];
+      if (of.sigma == kInfinity) continue;
+      distance.metres = known.metres;
+      distance.tolerance =
+          std::isnan(of.sigma)
+              ? known.tolerance
+              : std::hypot(known.tolerance, kRegionSigmas * of.sigma);
+    }
+  }
+  const bool has_scale =
+      adjustment->fixed.Any() || !adjustment->positions.empty();
+  const MeasuredDistances measured =
+      MeasureDistances(model, of_lengths.distances,
+                       has_scale ? std::optional<double>(1) : std::nullopt);
+  std::vector<char> is_wrong(of_lengths.distances.size(), 0);
+  if (!measured.scale) return is_wrong;
+  RequireOneScale("distances", of_lengths.distances.size(), *measured.scale);
+  for (size_t n = 0; n < is_wrong.size(); ++n) {
+    if (!of_lengths.distances[n].metres || measured.scale->agrees[n] != 0) {
+      continue;
+    }
+    is_wrong[n] = 1;
+    adjustment->distances[n].metres.reset();
+  }
+  return is_wrong;
 }
 
 // AdjustModel in the coordinates of the model.
@@ -133,8 +187,14 @@ AdjustModelResult AdjustInFrame(const Model& model,
     adjustment.max_error = summary.max_error;  // none if it is to be lowered
   }
   BundleAdjustmentSummary earlier;
-  if (!adjustment.positions.empty() && !adjustment.sigma_px) {
-    start = WeighPositions(model, context, &adjustment, &earlier);
+  const bool has_distances = !adjustment.distances.empty();
+  if (has_distances ||
+      (!adjustment.positions.empty() && !adjustment.sigma_px)) {
+    start = WeighKnown(model, context, &adjustment, &earlier);
+  }
+  if (has_distances) {
+    summary.is_wrong_distance =
+        LeaveOutWrongDistances(*start, context, &adjustment);
   }
   BundleAdjustmentResult adjusted =
       AdjustBundle(start ? *start : model, adjustment, context, options.datum,

@@ -38,6 +38,9 @@ struct AdjustModelSummary {
   PixelErrorStatistics pixel_error_start;  // where the adjustment began
   PixelErrorStatistics pixel_error_after;
   std::optional<AdjustmentPrecision> precision;  // if it was asked for
+  // As adjustment.distances: whether it contradicts the others, and is left
+  // out.
+  std::vector<char> is_wrong_distance;
 };
 
 struct AdjustModelResult {
@@ -48,7 +51,8 @@ struct AdjustModelResult {
 };
 
 // Updates the stored point errors, too. Has the requirements and exceptions of
-// AdjustBundle and SolveModel.
+// AdjustBundle and SolveModel. Throws ModelError if known distances alone give
+// the scale, and several of their largest sets agree.
 AdjustModelResult AdjustModel(const Model& model,
                               const AdjustModelOptions& options,
                               const Context& context = {});

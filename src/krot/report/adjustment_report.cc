@@ -185,7 +185,10 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
   }
   text << ".\n";
   if (summary.max_error) text << CapSentence(summary) << '\n';
-  if (adjustment.sigma_px) text << KnownPositionsSentence(report) << '\n';
+  if (report.positions || (adjustment.sigma_px && !report.distances)) {
+    text << KnownPositionsSentence(report) << '\n';
+  }
+  if (report.distances) text << AdjustedDistanceSentences(*report.distances);
   if (summary.precision) text << PrecisionSentence(*summary.precision) << '\n';
   std::string adjusted;
   if (summary.start) {
@@ -236,6 +239,7 @@ std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
       {"precision", precision},
       {"check_points", SurveyJson(report.check_points, true)},
       {"positions", KnownPositionsJson(report)},
+      {"distances", AdjustedDistancesJson(report.distances)},
   };
   return ReportText(json, report.run,
                     {{"start", start_seconds}, {"adjust", adjustment.seconds}});

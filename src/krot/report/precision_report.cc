@@ -32,6 +32,10 @@ std::string DatumSentence(const AdjustmentPrecision& precision) {
     case AdjustmentDatum::kCameras:
       break;
   }
+  if (precision.datum_defect == 6 && precision.num_distances > 0) {
+    return "Datum: free network; the mean centre and the mean rotation of all "
+           "cameras have no error, and the known distances give the scale.";
+  }
   return "Datum: free network; the mean centre, the mean rotation and the RMS "
          "extent of all cameras have no error.";
 }
@@ -337,6 +341,7 @@ std::string AdjustmentText(const AdjustmentReport& report, const Model& model) {
   std::string text = "KROT " + report.run.version + ", bundle adjustment\n" +
                      AdjustmentTable(report);
   text += SurveySections(report);
+  if (report.distances) text += AdjustedDistanceTable(*report.distances);
   if (!summary.precision) return text;
   const AdjustmentPrecision& precision = *summary.precision;
   const PrecisionFigures figures(precision, model);
@@ -370,8 +375,11 @@ std::string PrecisionSentence(const AdjustmentPrecision& precision) {
          ": " +
          Thousands(2 * static_cast<int64_t>(precision.observations.size()) +
                    3 * precision.num_positions) +
-         " observed coordinates, " +
-         Counted(precision.num_unknowns, "unknown") + ", datum defect " +
+         " observed coordinates" +
+         (precision.num_distances > 0
+              ? " and " + Counted(precision.num_distances, "distance")
+              : "") +
+         ", " + Counted(precision.num_unknowns, "unknown") + ", datum defect " +
          std::to_string(precision.datum_defect) + ".";
 }
 

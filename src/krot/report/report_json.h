@@ -75,6 +75,9 @@ Json PositionFrameJson(const std::optional<PositionFrame>& position_frame,
 Json DistancesJson(const std::optional<DistanceReport>& report,
                    const std::vector<std::string>& names);
 
+struct DistanceComparison;
+Json AdjustedDistancesJson(const std::optional<DistanceComparison>& comparison);
+
 // The text of a report. Image names are bytes; sequences that are not UTF-8 are
 // replaced.
 std::string ReportText(const Json& json);

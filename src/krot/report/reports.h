@@ -36,7 +36,14 @@ struct AdjustmentReport {
   std::optional<SurveyComparison> positions;    // that are known
   std::optional<PositionFrame> position_frame;  // if they have their own
   bool is_in_position_frame = false;            // what is written
+  std::optional<DistanceComparison> distances;
 };
+
+// Each known distance beside the adjusted one, metres.
+std::string AdjustedDistanceTable(const DistanceComparison& comparison);
+
+// How well they fit; a sentence for each that is wrong.
+std::string AdjustedDistanceSentences(const DistanceComparison& comparison);
 
 // For the terminal: errors before and after, what took part, why it ended.
 std::string AdjustmentTable(const AdjustmentReport& report);

@@ -5,6 +5,7 @@
 
 #include "krot/analysis/model_comparison.h"
 #include "krot/compare.h"
+#include "krot/model/known_distances.h"
 #include "krot/model/model_io.h"
 #include "krot/model/rigs.h"
 
@@ -78,6 +79,58 @@ std::optional<SurveyComparison> Survey::CompareCheckPoints(
   if (check_points.empty()) return std::nullopt;
   if (surveyed_.empty()) return CompareWithSurvey(adjusted, check_points);
   return CompareWithSurvey(adjusted, check_points, survey_from_model_);
+}
+
+DistanceSurvey::DistanceSurvey(std::vector<KnownDistance> distances,
+                               std::optional<double> held_metres_per_unit,
+                               Model* model)
+    : distances_(std::move(distances)) {
+  const std::vector<double> lengths = LengthsOf(*model, distances_);
+  std::vector<double> scales;
+  for (size_t n = 0; n < lengths.size(); ++n) {
+    const double scale = distances_[n].metres.value_or(kNaN) / lengths[n];
+    if (std::isfinite(scale)) scales.push_back(scale);
+  }
+  if (held_metres_per_unit) {
+    metres_per_read_ = metres_per_unit_ = *held_metres_per_unit;
+    for (KnownDistance& distance : distances_) {
+      if (!distance.metres) continue;
+      *distance.metres /= metres_per_unit_;
+      distance.tolerance /= metres_per_unit_;
+    }
+  } else if (!scales.empty()) {
+    metres_per_read_ = Median(std::move(scales));
+    Similarity scaled;
+    scaled.scale = *metres_per_read_;
+    *model = TransformModel(*model, scaled);
+  }
+}
+
+std::optional<DistanceComparison> DistanceSurvey::Compare(
+    const Model& adjusted, const AdjustModelSummary& summary) const {
+  if (distances_.empty()) return std::nullopt;
+  DistanceComparison comparison;
+  comparison.metres_per_unit = metres_per_read_;
+  comparison.num_taking_part = summary.adjustment.num_distances;
+  const std::vector<double> lengths = LengthsOf(adjusted, distances_);
+  for (size_t n = 0; n < lengths.size(); ++n) {
+    const KnownDistance& known = distances_[n];
+    DistanceComparison::Distance distance;
+    distance.name = NameOf(adjusted, known);
+    if (known.metres) distance.metres = *known.metres * metres_per_unit_;
+    distance.tolerance = known.tolerance * metres_per_unit_;
+    distance.is_wrong = summary.is_wrong_distance[n] != 0;
+    distance.length = lengths[n] * metres_per_unit_;
+    comparison.distances.push_back(std::move(distance));
+  }
+  if (!summary.precision) return comparison;
+  for (const DistancePrecision& of : summary.precision->distances) {
+    DistanceComparison::Distance& distance = comparison.distances[of.distance];
+    distance.sigma = of.sigma * metres_per_unit_;
+    distance.redundancy = of.redundancy;
+    distance.w = of.w;
+  }
+  return comparison;
 }
 
 }  // namespace krot::internal

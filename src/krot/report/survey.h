@@ -7,8 +7,10 @@
 #include <Eigen/Core>
 
 #include "krot/analysis/position_frame.h"
+#include "krot/base/numbers.h"
 #include "krot/geometry.h"
 #include "krot/model.h"
+#include "krot/pipeline/adjust_model.h"
 
 namespace krot::internal {
 
@@ -48,6 +50,11 @@ class Survey {
   // In the frame of the model.
   const std::vector<KnownPosition>& positions() const { return positions_; }
   const std::optional<PositionFrame>& frame() const { return frame_; }
+  // The survey's unit, for one unit of the model; none without positions.
+  std::optional<double> scale() const {
+    if (surveyed_.empty()) return std::nullopt;
+    return survey_from_model_.scale;
+  }
   bool is_in_own_frame() const { return is_in_own_frame_; }
 
   // The adjusted model beside the known positions; none without any.
@@ -63,6 +70,47 @@ class Survey {
   std::optional<PositionFrame> frame_;
   bool is_in_own_frame_ = false;
   Similarity survey_from_model_;
+};
+
+// Known distances beside those of an adjusted model; metres, or the model's
+// unit where no distance is known.
+struct DistanceComparison {
+  struct Distance {
+    std::string name;  // "a.jpg to b.jpg"
+    std::optional<double> metres;
+    double tolerance = 0;
+    bool is_wrong = false;
+    double length = 0;    // NaN if the model does not have it
+    double sigma = kNaN;  // of the length; infinite if it is not determined
+    double redundancy = kNaN;
+    double w = kNaN;
+  };
+
+  std::optional<double> metres_per_unit;  // of the model that was read
+  int64_t num_taking_part = 0;
+  std::vector<Distance> distances;
+};
+
+// The known distances of a bundle adjustment. Those without metres are only
+// measured.
+class DistanceSurvey {
+ public:
+  // Scales the model to metres by the median of what the distances say, unless
+  // something else holds its scale: `held_metres_per_unit`.
+  DistanceSurvey(std::vector<KnownDistance> distances,
+                 std::optional<double> held_metres_per_unit, Model* model);
+
+  // In the model's unit.
+  const std::vector<KnownDistance>& distances() const { return distances_; }
+
+  // None without distances.
+  std::optional<DistanceComparison> Compare(
+      const Model& adjusted, const AdjustModelSummary& summary) const;
+
+ private:
+  std::vector<KnownDistance> distances_;
+  std::optional<double> metres_per_read_;  // unit of the model that was read
+  double metres_per_unit_ = 1;             // of the model that is adjusted
 };
 
 }  // namespace krot::internal

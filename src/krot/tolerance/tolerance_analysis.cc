@@ -145,7 +145,7 @@ class LengthFinder {
     for (size_t n = 0; n < options_.distances.size(); ++n) {
       const KnownDistance& distance = options_.distances[n];
       ToleranceLength length;
-      length.name = distance.Name(model);
+      length.name = NameOf(model, distance);
       length.metres = distance.metres;
       length.tolerance = distance.tolerance;
       length.length = in_model[n];
