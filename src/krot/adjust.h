@@ -120,9 +120,10 @@ struct BundleAdjustmentSummary {
   int64_t num_no_pose = 0;
   int64_t num_behind = 0;
   int64_t num_short_track = 0;
-  int64_t num_parameters = 0;      // that moved, gauge included
-  int64_t num_positions = 0;       // known ones that took part
-  int64_t num_distances = 0;       // known ones that took part
+  int64_t num_parameters = 0;  // that moved, gauge included
+  int64_t num_positions = 0;   // known ones that took part
+  // Known ones that took part, in BundleAdjustmentOptions::distances.
+  std::vector<int32_t> distances;
   std::optional<double> sigma_px;  // pixel noise, against which they weighed
 
   // Half the sum of the robust squared errors, and of those of the known

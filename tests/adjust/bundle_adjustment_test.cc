@@ -302,7 +302,7 @@ TEST(AdjustBundle, WithKnownDistancesEndsWhereAnIndependentProblemDoes) {
   options.sigma_px = 0.7;
   const BundleAdjustmentResult result =
       AdjustBundle(model, options, kAdjustAlone);
-  EXPECT_EQ(result.summary.num_distances, 3);
+  EXPECT_EQ(result.summary.distances.size(), 3);
   const double expected = IndependentFixedRotationCost(
       model, nullptr, {}, {}, *options.sigma_px, options.distances);
   EXPECT_NEAR(result.summary.cost_final, expected, 1e-8 * expected);
@@ -342,7 +342,7 @@ TEST(AdjustBundle, LeavesOutDistancesThatCannotChange) {
   options.fixed = SomeFixed(model);
   const auto num_taking_part = [&](std::array<KnownDistance::End, 2> ends) {
     options.distances = {{ends, 1.0, 0.1}};
-    return AdjustBundle(model, options, kAdjustAlone).summary.num_distances;
+    return AdjustBundle(model, options, kAdjustAlone).summary.distances.size();
   };
   EXPECT_EQ(num_taking_part(Ends(-2, -3)), 0);  // fixed points
   EXPECT_EQ(num_taking_part(Ends(-2, -4)), 1);

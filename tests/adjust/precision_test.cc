@@ -674,7 +674,7 @@ TEST(Precision, CoversTheTruthOfLengthsWhereDistancesAreKnown) {
       distances[n].tolerance = 3 * sigma;
     }
     const AdjustModelResult result = AdjustModel(scene.model, adjust, {1});
-    EXPECT_EQ(result.summary.adjustment.num_distances, 6);
+    EXPECT_EQ(result.summary.adjustment.distances.size(), 6);
     for (const DistancePrecision& of : result.summary.precision->distances) {
       if (distances[of.distance].metres) continue;
       within += std::abs(of.length - truth[of.distance]) < 1.96 * of.sigma;

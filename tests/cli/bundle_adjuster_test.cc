@@ -178,7 +178,8 @@ TEST_F(BundleAdjuster, TakesScaleBarsAsObservations) {
   const Words bars = {"--distances_path", folder_ / "bars.txt"};
   const KrotResult result = Adjust(bars);
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, ::testing::HasSubstr("3 known distances took part"));
+  EXPECT_THAT(result.out,
+              ::testing::HasSubstr("metres: 3 known ones took part"));
   const Json report = Report();
   const Json& distances = report["distances"];
   EXPECT_NEAR(distances["metres_per_unit"], 2.5, 0.05);
@@ -186,6 +187,7 @@ TEST_F(BundleAdjuster, TakesScaleBarsAsObservations) {
   const Model output = Load(folder_ / "output");
   for (size_t n = 0; n < 5; ++n) {
     const Json& bar = distances["distances"][n];
+    EXPECT_EQ(bar["takes_part"], n < 3);
     EXPECT_EQ(bar["is_contradicted"], n == 3);
     EXPECT_NEAR(
         bar["after"],

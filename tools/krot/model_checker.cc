@@ -207,7 +207,7 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
   WriteViews(command, report, write_options, model, cured, database);
   PrintTable(log, CheckTable(report, command.num_worst));
   const ModelCheck& check = report.check;
-  const bool is_unknown = check.sigma_px && !check.is_adjusted;
+  const bool is_unknown = !check.is_adjusted;
   const bool fails =
       command.fail_on == "wrong" && (check.IsAnythingWrong() || is_unknown);
   return fails ? kExitWrong : kExitDone;

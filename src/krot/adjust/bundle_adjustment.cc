@@ -109,7 +109,8 @@ void Count(const AdjustmentBlocks& blocks, const AdjustmentColumns& columns,
   summary->num_parameters = columns.num_unknowns;
   summary->num_positions = static_cast<int64_t>(blocks.positions.size());
   for (const DistanceObservation& distance : blocks.distances) {
-    summary->num_distances += distance.px_from_world > 0 ? 1 : 0;
+    if (distance.px_from_world == 0) continue;
+    summary->distances.push_back(distance.index);
   }
 }
 

@@ -38,10 +38,11 @@ std::vector<KnownDistance> ReadDistances(const FileBytes& file,
     distance.ends = line->ends;
     if (!line->numbers.empty()) {
       for (const double number : line->numbers) {
-        if (number > 0) continue;
+        if (number >= 1e-12 && number <= 1e12) continue;
         std::string text = "\"";
         AppendNumber(number, &text);
-        list.reader().Fail(text + "\"", "METRES and TOLERANCE above zero");
+        list.reader().Fail(text + "\"",
+                           "METRES and TOLERANCE from 1e-12 to 1e12");
       }
       distance.metres = line->numbers[0];
       distance.tolerance = line->numbers[1];

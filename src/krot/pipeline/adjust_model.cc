@@ -127,6 +127,7 @@ std::vector<char> LeaveOutWrongDistances(const Model& model,
                                          BundleAdjustmentOptions* adjustment) {
   BundleAdjustmentOptions of_lengths = *adjustment;
   of_lengths.max_num_iterations = 0;
+  of_lengths.callback = {};
   for (KnownDistance& distance : of_lengths.distances) distance.metres.reset();
   std::optional<AdjustmentPrecision> precision;
   AdjustBundle(model, of_lengths, context, AdjustmentDatum::kCameras,

@@ -188,8 +188,8 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
   if (report.positions || (adjustment.sigma_px && !report.distances)) {
     text << KnownPositionsSentence(report) << '\n';
   }
-  if (report.distances) text << AdjustedDistanceSentences(*report.distances);
   if (summary.precision) text << PrecisionSentence(*summary.precision) << '\n';
+  if (report.distances) text << AdjustedDistanceTable(*report.distances);
   std::string adjusted;
   if (summary.start) {
     adjusted = "found a start in " +

@@ -10,10 +10,6 @@
 namespace krot::internal {
 namespace {
 
-bool IsNotAdjusted(const ModelCheck& check) {
-  return check.sigma_px && !check.is_adjusted;
-}
-
 std::string NoiseWords(const ModelCheck& check) {
   return check.sigma_px
              ? "noise of " + FormatNumber(*check.sigma_px, 3) + " px per axis" +
@@ -137,7 +133,7 @@ std::string NextSteps(const CheckReport& report) {
   const ModelCheck& check = report.check;
   const int64_t num_wrong = check.NumImages(ImageVerdict::kWrong);
   const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
-  if (!check.IsAnythingWrong() && num_weak == 0 && !IsNotAdjusted(check)) {
+  if (!check.IsAnythingWrong() && num_weak == 0 && check.is_adjusted) {
     return "";
   }
   const auto or_name = [](const std::string& path, const char* name) {
@@ -147,7 +143,7 @@ std::string NextSteps(const CheckReport& report) {
   const std::string cured = or_name(report.output_path, "CURED");
   const std::string database = or_name(report.database_path, "DATABASE");
   std::string text = "\nNext\n";
-  if (IsNotAdjusted(check)) {
+  if (!check.is_adjusted) {
     return text +
            "  Adjust the model with a loss that wrong observations do not bend "
            "(colmap bundle_adjuster of\n  COLMAP 4 has these options, too), "
@@ -310,7 +306,7 @@ std::string ForAdjusted(const CheckReport& report) {
 }  // namespace
 
 std::string CheckSentence(const CheckReport& report) {
-  if (!IsNotAdjusted(report.check)) return ForAdjusted(report);
+  if (report.check.is_adjusted) return ForAdjusted(report);
   if (!report.check.IsAnythingWrong()) {
     return "The model is not adjusted, so nothing can be said yet: adjust it, "
            "and check it again.";
@@ -329,7 +325,7 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
       " weakly held, " + Thousands(check.NumImages(ImageVerdict::kFine)) +
       " fine. Observations that others check: " + Thousands(check.num_tested) +
       ".\n";
-  if (IsNotAdjusted(check)) {
+  if (!check.is_adjusted) {
     text +=
         "Not adjusted: most images do not stand where their own errors would "
         "have them. That alone\nmakes observations and images look wrong.\n";

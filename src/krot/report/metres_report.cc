@@ -175,13 +175,15 @@ Json DistancesJson(const std::optional<DistanceReport>& report,
 }
 
 std::string AdjustedDistanceTable(const DistanceComparison& comparison) {
-  const bool is_metric = comparison.metres_per_unit.has_value();
   const auto number = [](double value, int digits) {
     return std::isfinite(value) ? FormatNumber(value, digits) : "-";
   };
   TextTable table;
   table.AddRow({"", "known", "within", "adjusted", "sigma", "off", "r", "w"});
+  int64_t num_taking_part = 0;
+  std::string wrong;
   for (const DistanceComparison::Distance& distance : comparison.distances) {
+    num_taking_part += distance.takes_part ? 1 : 0;
     std::vector<std::string> row = {distance.name, "-", "-"};
     if (distance.metres) {
       row[1] = FormatNumber(*distance.metres, 6);
@@ -189,43 +191,27 @@ std::string AdjustedDistanceTable(const DistanceComparison& comparison) {
     }
     row.push_back(number(distance.length, 6));
     row.push_back(number(distance.sigma, 6));
-    row.push_back(number(distance.length - distance.metres.value_or(kNaN), 6) +
-                  (distance.is_wrong ? " !" : ""));
+    row.push_back(number(distance.Off(), 6) +
+                  (distance.IsContradicted() ? " !" : ""));
     row.push_back(number(distance.redundancy, 3));
     row.push_back(number(distance.w, 2));
     table.AddRow(std::move(row));
+    if (!distance.IsContradicted()) continue;
+    wrong +=
+        "! The distance of " + distance.name + " is " +
+        Metres(distance.length) +
+        (distance.is_wrong ? " by all the rest" : "") + ", not " +
+        Metres(*distance.metres) + " to within " + Metres(distance.tolerance) +
+        (distance.is_wrong ? ": left out.\n"
+                           : ": the others or the images contradict it.\n");
   }
-  return std::string("\nDistances, ") +
-         (is_metric ? "metres" : "model's unit") + "\n" + table.ToString();
-}
-
-std::string AdjustedDistanceSentences(const DistanceComparison& comparison) {
-  std::string text;
-  if (comparison.num_taking_part == 0) {
-    text = "No known distance took part.\n";
-  } else {
-    const auto off = [](const DistanceComparison::Distance& distance) {
-      return distance.metres && !distance.is_wrong &&
-                     std::isfinite(distance.length)
-                 ? std::abs(distance.length - *distance.metres)
-                 : 0;
-    };
-    const auto farthest = std::max_element(
-        comparison.distances.begin(), comparison.distances.end(),
-        [&](const auto& a, const auto& b) { return off(a) < off(b); });
-    text = Counted(comparison.num_taking_part, "known distance") +
-           " took part: a unit of the model that was read is about " +
-           Metres(*comparison.metres_per_unit) + "; farthest off is " +
-           farthest->name + ", by " + Metres(off(*farthest)) + ".\n";
+  std::string text = "\nDistances, scene units";
+  if (comparison.metres_per_unit) {
+    text = "\nDistances, metres: " + Counted(num_taking_part, "known one") +
+           " took part; a unit of the model that was read is about " +
+           Metres(*comparison.metres_per_unit);
   }
-  for (const DistanceComparison::Distance& distance : comparison.distances) {
-    if (!distance.is_wrong) continue;
-    text += "! The distance of " + distance.name + " is " +
-            Metres(distance.length) + " by all the rest, not " +
-            Metres(*distance.metres) + " to within " +
-            Metres(distance.tolerance) + ": left out.\n";
-  }
-  return text;
+  return text + "\n" + table.ToString() + wrong;
 }
 
 Json AdjustedDistancesJson(
@@ -237,14 +223,14 @@ Json AdjustedDistancesJson(
         {{"name", distance.name},
          {"metres", NumberOrNull(distance.metres)},
          {"tolerance", distance.metres ? Json(distance.tolerance) : Json()},
-         {"is_contradicted", distance.is_wrong},
+         {"takes_part", distance.takes_part},
+         {"is_contradicted", distance.IsContradicted()},
          {"after", FiniteOrNull(distance.length)},
          {"sigma", FiniteOrNull(distance.sigma)},
          {"redundancy", FiniteOrNull(distance.redundancy)},
          {"w", FiniteOrNull(distance.w)}});
   }
   return {{"metres_per_unit", NumberOrNull(comparison->metres_per_unit)},
-          {"num_taking_part", comparison->num_taking_part},
           {"distances", std::move(list)}};
 }
 

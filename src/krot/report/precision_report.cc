@@ -341,7 +341,6 @@ std::string AdjustmentText(const AdjustmentReport& report, const Model& model) {
   std::string text = "KROT " + report.run.version + ", bundle adjustment\n" +
                      AdjustmentTable(report);
   text += SurveySections(report);
-  if (report.distances) text += AdjustedDistanceTable(*report.distances);
   if (!summary.precision) return text;
   const AdjustmentPrecision& precision = *summary.precision;
   const PrecisionFigures figures(precision, model);

@@ -39,11 +39,9 @@ struct AdjustmentReport {
   std::optional<DistanceComparison> distances;
 };
 
-// Each known distance beside the adjusted one, metres.
+// Each known distance beside the adjusted one; a sentence for each that is
+// wrong.
 std::string AdjustedDistanceTable(const DistanceComparison& comparison);
-
-// How well they fit; a sentence for each that is wrong.
-std::string AdjustedDistanceSentences(const DistanceComparison& comparison);
 
 // For the terminal: errors before and after, what took part, why it ended.
 std::string AdjustmentTable(const AdjustmentReport& report);

@@ -111,7 +111,6 @@ std::optional<DistanceComparison> DistanceSurvey::Compare(
   if (distances_.empty()) return std::nullopt;
   DistanceComparison comparison;
   comparison.metres_per_unit = metres_per_read_;
-  comparison.num_taking_part = summary.adjustment.num_distances;
   const std::vector<double> lengths = LengthsOf(adjusted, distances_);
   for (size_t n = 0; n < lengths.size(); ++n) {
     const KnownDistance& known = distances_[n];
@@ -122,6 +121,9 @@ std::optional<DistanceComparison> DistanceSurvey::Compare(
     distance.is_wrong = summary.is_wrong_distance[n] != 0;
     distance.length = lengths[n] * metres_per_unit_;
     comparison.distances.push_back(std::move(distance));
+  }
+  for (const int32_t n : summary.adjustment.distances) {
+    comparison.distances[n].takes_part = true;
   }
   if (!summary.precision) return comparison;
   for (const DistancePrecision& of : summary.precision->distances) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -79,15 +80,20 @@ struct DistanceComparison {
     std::string name;  // "a.jpg to b.jpg"
     std::optional<double> metres;
     double tolerance = 0;
-    bool is_wrong = false;
-    double length = 0;    // NaN if the model does not have it
-    double sigma = kNaN;  // of the length; infinite if it is not determined
+    bool takes_part = false;
+    bool is_wrong = false;  // left out
+    double length = 0;      // NaN if the model does not have it
+    double sigma = kNaN;    // of the length; infinite if it is not determined
     double redundancy = kNaN;
     double w = kNaN;
+
+    double Off() const { return length - metres.value_or(kNaN); }
+    bool IsContradicted() const {
+      return is_wrong || (takes_part && std::abs(Off()) > tolerance);
+    }
   };
 
   std::optional<double> metres_per_unit;  // of the model that was read
-  int64_t num_taking_part = 0;
   std::vector<Distance> distances;
 };
 
