@@ -165,8 +165,7 @@ struct DenseOracle {
               AdjustmentDatum datum)
       : blocks(MakeAdjustmentBlocks(model, 2, options.fixed)),
         columns(options, blocks) {
-    AddPositions(model, options.positions, 1, columns, &blocks);
-    AddDistances(model, options, &columns, &blocks);
+    AddSurvey(model, options, &columns, &blocks);
     const MatrixXd J = Differentiate(columns, blocks, StackedErrors);
     const VectorXd norms = J.colwise().norm();
     std::vector<Index> moving;
@@ -242,12 +241,9 @@ struct DenseOracle {
 AdjustmentPrecision PrecisionOf(const Model& model,
                                 const BundleAdjustmentOptions& options,
                                 AdjustmentDatum datum) {
-  AdjustmentBlocks blocks =
+  const AdjustmentBlocks blocks =
       MakeAdjustmentBlocks(model, options.min_track_length, options.fixed);
-  AdjustmentColumns columns(options, blocks);
-  AddPositions(model, options.positions, 1, columns, &blocks);
-  AddDistances(model, options, &columns, &blocks);
-  return FindPrecision(model, options, columns, blocks, datum, {});
+  return FindPrecision(model, options, blocks, datum, {});
 }
 
 void ExpectNear(const MatrixXd& actual, const MatrixXd& expected) {
@@ -376,6 +372,7 @@ TEST(Precision, IsByItsDefinitionWherePositionsAreKnown) {
   const Model in_rigs = PreciseScene(2);
   const Model alone = PreciseScene(2, 1);
   BundleAdjustmentOptions options;
+  options.sigma_px = 1;
   for (const auto& [num_images, num_points] :
        {std::pair(2, 2), std::pair(0, 3), std::pair(2, 1)}) {
     for (const Model* model : {&in_rigs, &alone}) {
@@ -392,6 +389,7 @@ TEST(Precision, CountsTheGaugeThatKnownPositionsLeave) {
   const Model model = PreciseScene(2, 1);
   const auto defect = [&](int num_images, int num_points) {
     BundleAdjustmentOptions options;
+    options.sigma_px = 1;
     options.positions = SomePositions(model, num_images, num_points);
     return PrecisionOf(model, options, AdjustmentDatum::kCameras).datum_defect;
   };
@@ -511,6 +509,43 @@ TEST(Precision, SaysWhichImageIsNotDetermined) {
     const auto row = static_cast<Index>(2 * i);
     EXPECT_NEAR(precision.observations[i].redundancy.x(), oracle.R(row, row),
                 1e-4);
+  }
+}
+
+// A point that least squares put into a camera, which another one sees from
+// behind: all else is as precise as without that point.
+TEST(Precision, LeavesOutAPointThatLiesInACamera) {
+  Model model = PreciseScene(2, 1);
+  const auto indices = ImageIndices(model);
+  size_t k = 0;
+  const auto is_in_both = [&] {
+    int num_in_both = 0;
+    for (uint64_t e = model.points3D[k].track_begin;
+         e < model.points3D[k].track_end; ++e) {
+      num_in_both += indices.at(model.track_elements[e].image_id) < 2;
+    }
+    return num_in_both == 2;
+  };
+  while (!is_in_both()) ++k;
+  Point3D& point = model.points3D[k];
+  const Vector3d centre = CentreOf(ToBlock(model.frames[0].rig_from_world));
+  const Vector3d ray = point.xyz - centre;
+  Pose& pose = model.frames[1].rig_from_world;
+  pose.translation = -(pose.Rotation() * (centre - 0.05 * ray));
+  model.images[1].cam_from_world = pose;
+  point.xyz = centre + 1e-9 * ray;
+  Model without = model;
+  without.points3D[k].track_end = without.points3D[k].track_begin;
+  const AdjustmentPrecision precision =
+      PrecisionOf(model, {}, AdjustmentDatum::kCameras);
+  const AdjustmentPrecision expected =
+      PrecisionOf(without, {}, AdjustmentDatum::kCameras);
+  EXPECT_EQ(precision.num_points_in_cameras, 1);
+  EXPECT_EQ(precision.num_undetermined, 0);
+  EXPECT_EQ(precision.redundancy, expected.redundancy);
+  for (size_t n = 0; n < model.images.size(); ++n) {
+    ASSERT_TRUE(precision.images[n].covariance);
+    ExpectNear(*precision.images[n].covariance, *expected.images[n].covariance);
   }
 }
 

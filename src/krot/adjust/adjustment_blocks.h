@@ -161,16 +161,13 @@ struct AdjustmentColumns {
   }
 };
 
-// Adds the known positions of what moves. Throws std::invalid_argument if a
-// point has two.
-void AddPositions(const Model& model,
-                  const std::vector<KnownPosition>& positions, double sigma_px,
-                  const AdjustmentColumns& columns, AdjustmentBlocks* blocks);
-
-// Adds the distances both of whose ends take part, in one component, and whose
-// length is not the same however they move. Keeps the points at which they end.
-void AddDistances(const Model& model, const BundleAdjustmentOptions& options,
-                  AdjustmentColumns* columns, AdjustmentBlocks* blocks);
+// Replaces the blocks' positions and distances by those of the options: the
+// known positions of what moves, and the distances both of whose ends take
+// part, in one component, and whose length is not the same however they move.
+// Keeps the points at which these end. Throws std::invalid_argument if a point
+// has two positions.
+void AddSurvey(const Model& model, const BundleAdjustmentOptions& options,
+               AdjustmentColumns* columns, AdjustmentBlocks* blocks);
 
 // Where the blocks have it.
 Eigen::Vector3d PositionOf(const Place& place, const AdjustmentBlocks& blocks);

@@ -189,12 +189,7 @@ BundleAdjustmentResult AdjustBundle(
   AdjustmentBlocks before =
       MakeAdjustmentBlocks(model, options.min_track_length, options.fixed);
   AdjustmentColumns columns(options, before);
-  if (!options.positions.empty()) {
-    AddPositions(model, options.positions, *options.sigma_px, columns, &before);
-  }
-  if (!options.distances.empty()) {
-    AddDistances(model, options, &columns, &before);
-  }
+  AddSurvey(model, options, &columns, &before);
   AdjustmentBlocks blocks = before;
 
   const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(options);
@@ -225,8 +220,7 @@ BundleAdjustmentResult AdjustBundle(
   result.model = ApplyBlocks(model, before, blocks);
   if (precision != nullptr && summary.num_parameters > 0 && cost) {
     context.Stage("computing standard deviations and redundancy numbers");
-    *precision =
-        FindPrecision(result.model, options, columns, blocks, datum, context);
+    *precision = FindPrecision(result.model, options, blocks, datum, context);
   }
   summary.seconds = timer.Seconds();
   return result;

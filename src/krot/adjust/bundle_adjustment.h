@@ -102,6 +102,7 @@ struct AdjustmentPrecision {
   // Unknowns, beyond the datum, that no observation determines. Unknown without
   // covariances, and counted as 0.
   int64_t num_undetermined = 0;
+  int64_t num_points_in_cameras = 0;  // that see them; left out of all this
   int64_t redundancy = 0;
   double sigma0_px = kNaN;  // NaN without redundancy
   bool has_covariances = false;

@@ -23,6 +23,12 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
+double DistanceOf(const AdjustmentObservation& o,
+                  const AdjustmentBlocks& blocks) {
+  const Place camera = {o.frame, o.sensor, -1};
+  return (blocks.points[o.point] - PositionOf(camera, blocks)).norm();
+}
+
 // The angle between two of a point's rays that is nearest to 90; degrees.
 double MeetingAngle(const std::vector<Vector3d>& rays) {
   double largest = 0;
@@ -248,16 +254,46 @@ class PrecisionOfAdjustment {
   AdjustmentPrecision result_;
 };
 
+// Whether each point is nearer to a camera that sees it than a millionth of
+// that frame's median distance.
+std::vector<char> LieInCameras(const AdjustmentBlocks& blocks) {
+  std::vector<std::vector<double>> distances(blocks.frames.size());
+  for (const AdjustmentObservation& o : blocks.observations) {
+    distances[o.frame].push_back(DistanceOf(o, blocks));
+  }
+  std::vector<double> medians;
+  for (std::vector<double>& of_frame : distances) {
+    medians.push_back(of_frame.empty() ? 0 : Median(std::move(of_frame)));
+  }
+  std::vector<char> lie(blocks.points.size(), 0);
+  for (const AdjustmentObservation& o : blocks.observations) {
+    if (DistanceOf(o, blocks) < 1e-6 * medians[o.frame]) lie[o.point] = 1;
+  }
+  return lie;
+}
+
 }  // namespace
 
 AdjustmentPrecision FindPrecision(const Model& model,
                                   const BundleAdjustmentOptions& options,
-                                  const AdjustmentColumns& columns,
                                   const AdjustmentBlocks& blocks,
                                   AdjustmentDatum datum,
                                   const Context& context) {
-  return PrecisionOfAdjustment(model, options, columns, blocks, datum, context)
-      .Run();
+  const std::vector<char> lie = LieInCameras(blocks);
+  AdjustmentBlocks kept = blocks;
+  auto& observations = kept.observations;
+  observations.erase(std::remove_if(observations.begin(), observations.end(),
+                                    [&](const AdjustmentObservation& o) {
+                                      return lie[o.point] != 0;
+                                    }),
+                     observations.end());
+  AdjustmentColumns columns(options, kept);
+  AddSurvey(model, options, &columns, &kept);
+  AdjustmentPrecision precision =
+      PrecisionOfAdjustment(model, options, columns, kept, datum, context)
+          .Run();
+  precision.num_points_in_cameras = std::count(lie.begin(), lie.end(), 1);
+  return precision;
 }
 
 }  // namespace krot::internal

@@ -225,13 +225,14 @@ class PointCovariance {
 
 // ---- All of it ----
 
-// The precision of the model's estimate as it stands, with equal weights.
+// The precision of the model's estimate as it stands, with equal weights. A
+// point that lies in a camera that sees it says nothing about that camera's
+// place, beside which all else would be rounding: it is left out.
 // Beyond options.max_num_images_direct_sparse images there are no covariances
 // and redundancy numbers: with n unknowns besides the points they take 16 n^2
 // bytes and O(n^3). The same bits at any number of threads.
 AdjustmentPrecision FindPrecision(const Model& model,
                                   const BundleAdjustmentOptions& options,
-                                  const AdjustmentColumns& columns,
                                   const AdjustmentBlocks& blocks,
                                   AdjustmentDatum datum,
                                   const Context& context);

@@ -75,14 +75,10 @@ class Places {
   std::vector<char> has_frame_, has_point_;
 };
 
-}  // namespace
-
-void AddPositions(const Model& model,
-                  const std::vector<KnownPosition>& positions, double sigma_px,
+void AddPositions(const Places& places, const BundleAdjustmentOptions& options,
                   const AdjustmentColumns& columns, AdjustmentBlocks* blocks) {
-  const Places places(model, *blocks);
   std::vector<char> has_position(blocks->points.size(), 0);
-  for (const KnownPosition& known : positions) {
+  for (const KnownPosition& known : options.positions) {
     const auto place =
         places.Find(known.of == KnownPosition::Of::kImage, known.index);
     if (!place || !Moves(columns, *place)) continue;
@@ -93,13 +89,12 @@ void AddPositions(const Model& model,
     }
     blocks->positions.push_back(
         {*place, known.region.centre,
-         kRegionSigmas * sigma_px * known.region.UnitFromWorld()});
+         kRegionSigmas * *options.sigma_px * known.region.UnitFromWorld()});
   }
 }
 
-void AddDistances(const Model& model, const BundleAdjustmentOptions& options,
+void AddDistances(const Places& places, const BundleAdjustmentOptions& options,
                   AdjustmentColumns* columns, AdjustmentBlocks* blocks) {
-  const Places places(model, *blocks);
   std::vector<int32_t> of_frame(blocks->frames.size(), -1);
   std::vector<int32_t> of_point(blocks->points.size(), -1);
   int32_t number = 0;
@@ -133,6 +128,20 @@ void AddDistances(const Model& model, const BundleAdjustmentOptions& options,
       if (end.point >= 0) columns->Keep(end.point);
     }
     blocks->distances.push_back(distance);
+  }
+}
+
+}  // namespace
+
+void AddSurvey(const Model& model, const BundleAdjustmentOptions& options,
+               AdjustmentColumns* columns, AdjustmentBlocks* blocks) {
+  blocks->positions.clear();
+  blocks->distances.clear();
+  if (options.positions.empty() && options.distances.empty()) return;
+  const Places places(model, *blocks);
+  AddPositions(places, options, *columns, blocks);
+  if (!options.distances.empty()) {
+    AddDistances(places, options, columns, blocks);
   }
 }
 

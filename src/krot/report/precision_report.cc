@@ -119,6 +119,10 @@ std::string SummarySection(const AdjustModelSummary& summary,
   if (precision.num_undetermined > 0) {
     row("unknowns not determined", Thousands(precision.num_undetermined));
   }
+  if (precision.num_points_in_cameras > 0) {
+    row("object points in a camera that sees them, left out",
+        Thousands(precision.num_points_in_cameras));
+  }
   row("redundancy", Thousands(precision.redundancy));
   row("sigma0 a posteriori, px", FormatNumber(precision.sigma0_px, 6));
   const auto worst = figures.LargestResiduals();
