@@ -629,6 +629,19 @@ TEST(Precision, CoversTheTruthAsOftenAsItSays) {
               4 * std::sqrt(2 * redundancy));
 }
 
+// Noise of 0.7 px, and a start that is off.
+SyntheticScene NoisyScene(int num_frames, int num_points, int seed) {
+  SceneOptions options;
+  options.num_frames = num_frames;
+  options.num_points = num_points;
+  options.track_length = 5;
+  options.pixel_noise = 0.7;
+  options.start_translation_noise = 0.002;
+  options.start_point_noise = 0.002;
+  options.random_seed = seed;
+  return SynthesizeScene(options);
+}
+
 // 30 scenes whose start is off, in the frame of positions with noise: errors of
 // centres beyond 1.96 standard deviations are 5 %, which takes the noise of the
 // pixels to be found, too.
@@ -640,15 +653,7 @@ TEST(Precision, CoversTheTruthWherePositionsAreKnown) {
   int64_t num_tried = 0, within = 0;
   double sigma0 = 0;
   for (int seed = 0; seed < kScenes; ++seed) {
-    SceneOptions options;
-    options.num_frames = 12;
-    options.num_points = 150;
-    options.track_length = 5;
-    options.pixel_noise = 0.7;
-    options.start_translation_noise = 0.002;
-    options.start_point_noise = 0.002;
-    options.random_seed = seed;
-    const SyntheticScene scene = SynthesizeScene(options);
+    const SyntheticScene scene = NoisyScene(12, 150, seed);
     const std::vector<ImageGeometry> truth =
         ImageGeometries(scene.ground_truth);
     AdjustModelOptions adjust;
@@ -687,15 +692,7 @@ TEST(Precision, CoversTheTruthOfLengthsWhereDistancesAreKnown) {
   std::normal_distribution<double> noise(0, 1);
   int64_t num_tried = 0, within = 0;
   for (int seed = 0; seed < 40; ++seed) {
-    SceneOptions options;
-    options.num_frames = 10;
-    options.num_points = 80;
-    options.track_length = 5;
-    options.pixel_noise = 0.7;
-    options.start_translation_noise = 0.002;
-    options.start_point_noise = 0.002;
-    options.random_seed = seed;
-    const SyntheticScene scene = SynthesizeScene(options);
+    const SyntheticScene scene = NoisyScene(10, 80, seed);
     AdjustModelOptions adjust;
     adjust.finds_precision = true;
     std::vector<KnownDistance>& distances = adjust.adjustment.distances;
@@ -710,9 +707,11 @@ TEST(Precision, CoversTheTruthOfLengthsWhereDistancesAreKnown) {
     }
     const AdjustModelResult result = AdjustModel(scene.model, adjust, {1});
     EXPECT_EQ(result.summary.adjustment.distances.size(), 6);
+    const std::vector<double> after = LengthsOf(result.model, distances);
     for (const DistancePrecision& of : result.summary.precision->distances) {
       if (distances[of.distance].metres) continue;
-      within += std::abs(of.length - truth[of.distance]) < 1.96 * of.sigma;
+      within +=
+          std::abs(after[of.distance] - truth[of.distance]) < 1.96 * of.sigma;
       ++num_tried;
     }
   }

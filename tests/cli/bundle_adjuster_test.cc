@@ -8,6 +8,7 @@
 
 #include "krot/geometry.h"
 #include "krot/model.h"
+#include "krot/model/known_distances.h"
 #include "krot/model/rigs.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
@@ -238,11 +239,16 @@ TEST_F(BundleAdjuster, TakesKnownPositionsAsObservations) {
   }
   gps.close();
   check.close();
+  // In metres, whichever frame the adjustment is done in.
+  std::ofstream(folder_ / "bar.txt")
+      << model.images[0].name << ' ' << model.images[2].name << ' '
+      << 3 * LengthsOf(model, {{{{{true, 0}, {true, 2}}}, {}, 0}})[0]
+      << " 0.06\n";
   for (const std::string frame : {"own", "model"}) {
-    const KrotResult result =
-        Adjust({"--positions_path", folder_ / "gps.txt", "--positions_frame",
-                "own", "--output_frame", frame, "--check_points_path",
-                folder_ / "check.txt"});
+    const KrotResult result = Adjust(
+        {"--positions_path", folder_ / "gps.txt", "--positions_frame", "own",
+         "--output_frame", frame, "--check_points_path", folder_ / "check.txt",
+         "--distances_path", folder_ / "bar.txt"});
     ASSERT_EQ(result.exit_code, 0) << result.err;
     EXPECT_THAT(result.err, ::testing::HasSubstr("the position of " +
                                                  model.images[1].name));
@@ -256,6 +262,10 @@ TEST_F(BundleAdjuster, TakesKnownPositionsAsObservations) {
     EXPECT_EQ(positions["frame"]["is_written"], frame == "own");
     EXPECT_EQ(report["precision"]["datum_defect"], 0);
     EXPECT_LT(report["check_points"]["rms"], 0.3);
+    EXPECT_TRUE(report["distances"]["metres_per_unit"].is_null());
+    const Json& bar = report["distances"]["distances"][0];
+    EXPECT_TRUE(bar["takes_part"]);
+    EXPECT_NEAR(bar["after"], bar["metres"], 0.06);
     const Model output = Load(folder_ / "output");
     const Eigen::Vector3d written =
         Center(ImageGeometries(output)[0].cam_from_world);

@@ -6,11 +6,12 @@
 KROT and BENCHMARK are the built programs. Makes rings of so many images (200,
 1000 and 5000 if none are given; 400 observations each, tracks of eight, noise
 of 1 px) with 0, 10 and 30 % of the observations wrong and rotations off by 0,
-0.3, 1 and 2 degrees (by 0.3 beyond 1000 images), lets `krot solver --Solver.init feasible` find the positions and `krot
-bundle_adjuster` adjust them with a Cauchy loss; up to 1000 images also the
-rival of bearings (`krot_benchmark positioning`). Prints user and system CPU
-seconds, memory, and the RMS distance of the centres from the truth as a
-percentage of the radius. The Python standard library is enough.
+0.3, 1 and 2 degrees (by 0.3 beyond 1000 images), lets `krot solver
+--Solver.init feasible` find the positions and `krot bundle_adjuster` adjust
+them with a Cauchy loss; up to 1000 images also the rival of bearings
+(`krot_benchmark positioning`). Prints user and system CPU seconds, memory, and
+the RMS distance of the centres from the truth as a percentage of the radius.
+The Python standard library is enough.
 """
 
 import json
@@ -80,7 +81,8 @@ def measure(krot, benchmark, folder, images, share, turned):
     with open(report, encoding="utf-8") as file:
         memory = json.load(file)["peak_memory_bytes"]
     row = (f"| {images} | {share:.0%} | {turned} | {seconds:.1f} |"
-           f" {memory / 2**20:.0f} | {code} | {cell(centres(krot, truth, out, compared))} |"
+           f" {memory / 2**20:.0f} | {code} |"
+           f" {cell(centres(krot, truth, out, compared))} |"
            f" {adjust(out)} |")
     if images > 1000:
         return row + " | | | |"
@@ -101,8 +103,8 @@ def main():
         for share in (0, 0.1, 0.3):
             for turned in (0, 0.3, 1, 2) if images <= 1000 else (0.3,):
                 with tempfile.TemporaryDirectory() as folder:
-                    print(measure(*sys.argv[1:3], folder, images, share, turned),
-                          flush=True)
+                    print(measure(*sys.argv[1:3], folder, images, share,
+                                  turned), flush=True)
 
 
 if __name__ == "__main__":

@@ -233,6 +233,12 @@ std::vector<AdjustmentComponent> FindComponents(const AdjustmentBlocks& blocks,
 void RestoreSimilarity(const BundleAdjustmentOptions& options,
                        const AdjustmentBlocks& before, AdjustmentBlocks* after);
 
+// For each frame the median distance, from its centre, of the points of these
+// observations.
+std::vector<double> TypicalDistances(
+    const AdjustmentBlocks& blocks,
+    const std::vector<AdjustmentObservation>& of);
+
 // The error and the depth of an observation.
 struct ProjectedError {
   Eigen::Vector2d r;  // projected minus measured, pixels

@@ -83,8 +83,7 @@ struct PointPrecision {
 
 struct DistancePrecision {
   int32_t distance = 0;  // in BundleAdjustmentOptions::distances
-  double length = 0;
-  double sigma = kNaN;  // of the length; infinite if it is not determined
+  double sigma = kNaN;   // of the length; infinite if it is not determined
   // Of a known distance: its redundancy number; NaN if unknown.
   double redundancy = kNaN;
   // The difference from the known length over its standard deviation.

@@ -284,22 +284,6 @@ Matrix3d MeanRotation(const std::vector<PoseBlock>& before,
   return NearestRotation(sum).value_or(Matrix3d::Identity());
 }
 
-// For each frame the typical distance of the points that it sees.
-std::vector<double> TypicalDistances(
-    const AdjustmentBlocks& blocks,
-    const std::vector<AdjustmentObservation>& of) {
-  std::vector<double> distances;
-  std::vector<int32_t> frame_of;
-  for (const AdjustmentObservation& observation : of) {
-    distances.push_back((blocks.points[observation.point] -
-                         CenterOf(blocks.frames[observation.frame]))
-                            .norm());
-    frame_of.push_back(observation.frame);
-  }
-  return GroupMedians(distances, frame_of,
-                      static_cast<int32_t>(blocks.frames.size()), {});
-}
-
 // The frames of a component that keep their place among the others, once the
 // world has turned.
 std::vector<size_t> HeldFrames(const AdjustmentBlocks& before,
@@ -339,6 +323,21 @@ void MoveFrame(const Vector3d& center, const Matrix3d& world_rotation,
 }
 
 }  // namespace
+
+std::vector<double> TypicalDistances(
+    const AdjustmentBlocks& blocks,
+    const std::vector<AdjustmentObservation>& of) {
+  std::vector<double> distances;
+  std::vector<int32_t> frame_of;
+  for (const AdjustmentObservation& observation : of) {
+    distances.push_back((blocks.points[observation.point] -
+                         CenterOf(blocks.frames[observation.frame]))
+                            .norm());
+    frame_of.push_back(observation.frame);
+  }
+  return GroupMedians(distances, frame_of,
+                      static_cast<int32_t>(blocks.frames.size()), {});
+}
 
 void RestoreSimilarity(const BundleAdjustmentOptions& options,
                        const AdjustmentBlocks& before,

@@ -23,12 +23,6 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-double DistanceOf(const AdjustmentObservation& o,
-                  const AdjustmentBlocks& blocks) {
-  const Place camera = {o.frame, o.sensor, -1};
-  return (blocks.points[o.point] - PositionOf(camera, blocks)).norm();
-}
-
 // The angle between two of a point's rays that is nearest to 90; degrees.
 double MeetingAngle(const std::vector<Vector3d>& rays) {
   double largest = 0;
@@ -215,7 +209,7 @@ class PrecisionOfAdjustment {
 
   void DescribeDistances() {
     for (const DistanceObservation& of : blocks_.distances) {
-      result_.distances.push_back({of.index, LengthOf(of, blocks_)});
+      result_.distances.push_back({of.index});
       if (!covariance_) continue;
       DistancePrecision& distance = result_.distances.back();
       const BlockJacobian length =
@@ -255,19 +249,16 @@ class PrecisionOfAdjustment {
 };
 
 // Whether each point is nearer to a camera that sees it than a millionth of
-// that frame's median distance.
+// what is typical for its frame.
 std::vector<char> LieInCameras(const AdjustmentBlocks& blocks) {
-  std::vector<std::vector<double>> distances(blocks.frames.size());
-  for (const AdjustmentObservation& o : blocks.observations) {
-    distances[o.frame].push_back(DistanceOf(o, blocks));
-  }
-  std::vector<double> medians;
-  for (std::vector<double>& of_frame : distances) {
-    medians.push_back(of_frame.empty() ? 0 : Median(std::move(of_frame)));
-  }
+  const std::vector<double> typical =
+      TypicalDistances(blocks, blocks.observations);
   std::vector<char> lie(blocks.points.size(), 0);
   for (const AdjustmentObservation& o : blocks.observations) {
-    if (DistanceOf(o, blocks) < 1e-6 * medians[o.frame]) lie[o.point] = 1;
+    const Vector3d camera = PositionOf({o.frame, o.sensor, -1}, blocks);
+    if ((blocks.points[o.point] - camera).norm() < 1e-6 * typical[o.frame]) {
+      lie[o.point] = 1;
+    }
   }
   return lie;
 }

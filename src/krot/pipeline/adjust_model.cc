@@ -93,8 +93,7 @@ Model WeighKnown(const Model& model, const Context& context,
   const auto noise_of = [&](const Model& of) {
     return EstimateNoise(of, {}, context).sigma_px.value_or(1);
   };
-  const int max_rounds =
-      adjustment->sigma_px || adjustment->positions.empty() ? 1 : kMaxRounds;
+  const int max_rounds = adjustment->positions.empty() ? 1 : kMaxRounds;
   const bool finds_noise = !adjustment->sigma_px;
   if (finds_noise) adjustment->sigma_px = noise_of(model);
   BundleAdjustmentOptions without_distances = *adjustment;
@@ -120,11 +119,14 @@ Model WeighKnown(const Model& model, const Context& context,
 
 // Finds the distances that contradict the model, or each other where they alone
 // give it a scale: by more than the tolerance and three standard deviations of
-// the length in a model that is adjusted without them, where these are known.
-// Their lengths count as unknown from then on.
+// the length in a model that is adjusted without them. Where these are unknown
+// the tolerance alone decides, and a length that is not determined contradicts
+// nothing. Wrong lengths count as unknown from then on.
 std::vector<char> LeaveOutWrongDistances(const Model& model,
                                          const Context& context,
                                          BundleAdjustmentOptions* adjustment) {
+  std::vector<char> is_wrong(adjustment->distances.size(), 0);
+  if (context.IsCancelled()) return is_wrong;
   BundleAdjustmentOptions of_lengths = *adjustment;
   of_lengths.max_num_iterations = 0;
   of_lengths.callback = {};
@@ -149,7 +151,6 @@ std::vector<char> LeaveOutWrongDistances(const Model& model,
   const MeasuredDistances measured =
       MeasureDistances(model, of_lengths.distances,
                        has_scale ? std::optional<double>(1) : std::nullopt);
-  std::vector<char> is_wrong(of_lengths.distances.size(), 0);
   if (!measured.scale) return is_wrong;
   RequireOneScale("distances", of_lengths.distances.size(), *measured.scale);
   for (size_t n = 0; n < is_wrong.size(); ++n) {

@@ -206,10 +206,13 @@ std::string AdjustedDistanceTable(const DistanceComparison& comparison) {
                            : ": the others or the images contradict it.\n");
   }
   std::string text = "\nDistances, scene units";
-  if (comparison.metres_per_unit) {
+  if (comparison.is_metric) {
     text = "\nDistances, metres: " + Counted(num_taking_part, "known one") +
-           " took part; a unit of the model that was read is about " +
-           Metres(*comparison.metres_per_unit);
+           " took part";
+  }
+  if (comparison.metres_per_unit) {
+    text += "; a unit of the model that was read is about " +
+            Metres(*comparison.metres_per_unit);
   }
   return text + "\n" + table.ToString() + wrong;
 }

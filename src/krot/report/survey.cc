@@ -91,17 +91,18 @@ DistanceSurvey::DistanceSurvey(std::vector<KnownDistance> distances,
     const double scale = distances_[n].metres.value_or(kNaN) / lengths[n];
     if (std::isfinite(scale)) scales.push_back(scale);
   }
+  is_metric_ = held_metres_per_unit || !scales.empty();
   if (held_metres_per_unit) {
-    metres_per_read_ = metres_per_unit_ = *held_metres_per_unit;
+    metres_per_unit_ = *held_metres_per_unit;
     for (KnownDistance& distance : distances_) {
       if (!distance.metres) continue;
       *distance.metres /= metres_per_unit_;
       distance.tolerance /= metres_per_unit_;
     }
   } else if (!scales.empty()) {
-    metres_per_read_ = Median(std::move(scales));
+    scaled_by_ = Median(std::move(scales));
     Similarity scaled;
-    scaled.scale = *metres_per_read_;
+    scaled.scale = *scaled_by_;
     *model = TransformModel(*model, scaled);
   }
 }
@@ -110,7 +111,8 @@ std::optional<DistanceComparison> DistanceSurvey::Compare(
     const Model& adjusted, const AdjustModelSummary& summary) const {
   if (distances_.empty()) return std::nullopt;
   DistanceComparison comparison;
-  comparison.metres_per_unit = metres_per_read_;
+  comparison.is_metric = is_metric_;
+  comparison.metres_per_unit = scaled_by_;
   const std::vector<double> lengths = LengthsOf(adjusted, distances_);
   for (size_t n = 0; n < lengths.size(); ++n) {
     const KnownDistance& known = distances_[n];

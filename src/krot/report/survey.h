@@ -73,8 +73,7 @@ class Survey {
   Similarity survey_from_model_;
 };
 
-// Known distances beside those of an adjusted model; metres, or the model's
-// unit where no distance is known.
+// Known distances beside those of an adjusted model.
 struct DistanceComparison {
   struct Distance {
     std::string name;  // "a.jpg to b.jpg"
@@ -93,7 +92,10 @@ struct DistanceComparison {
     }
   };
 
-  std::optional<double> metres_per_unit;  // of the model that was read
+  bool is_metric = false;  // in metres; else in the model's unit
+  // By which the model that was read was scaled; none if something else holds
+  // its scale, or no distance is known.
+  std::optional<double> metres_per_unit;
   std::vector<Distance> distances;
 };
 
@@ -115,8 +117,9 @@ class DistanceSurvey {
 
  private:
   std::vector<KnownDistance> distances_;
-  std::optional<double> metres_per_read_;  // unit of the model that was read
-  double metres_per_unit_ = 1;             // of the model that is adjusted
+  bool is_metric_ = false;
+  std::optional<double> scaled_by_;
+  double metres_per_unit_ = 1;  // of the model that is adjusted
 };
 
 }  // namespace krot::internal
