@@ -78,8 +78,8 @@ if [[ $system == windows ]]; then
     -DEigen3_DIR=/usr/share/eigen3/cmake)
   options+=("${toolchain[@]}" -DBoost_NO_BOOST_CMAKE=ON
     -DZLIB_LIBRARY=/usr/x86_64-w64-mingw32/lib/libz.a)
-  install_missing "${build_needs[@]}" xz:xz-utils tclsh:tcl libz-mingw-w64-dev \
-    x86_64-w64-mingw32-g++-posix:g++-mingw-w64-x86-64-posix
+  install_missing "${build_needs[@]}" xz:xz-utils make:make tclsh:tcl \
+    libz-mingw-w64-dev x86_64-w64-mingw32-g++-posix:g++-mingw-w64-x86-64-posix
 else
   install_missing "${build_needs[@]}" xz:xz-utils
 fi
