@@ -10,7 +10,7 @@ linux=$root/build-linux/krot
 program=$root/build-windows/krot.exe
 [[ -x $linux && -e $program ]] \
   || die "tools/build_static.sh linux and windows come first"
-install_missing wine wine64
+install_missing wine wine64 python3:python3
 
 scratch=$(mktemp -d)
 export WINEPREFIX=$scratch/prefix WINEDEBUG=-all
