@@ -536,6 +536,43 @@ TEST(CheckModel, CallsAnImageWrongThatNothingHolds) {
   }
 }
 
+// What only a wrong image could check speaks neither for nor against the other
+// one.
+TEST(CheckModel, DoesNotCallAnImageWrongForHavingAWrongNeighbourAlone) {
+  Model model = Scene(4, 10, 5);
+  const ImageId wrong = model.images[7].id;
+  const ImageId alone = model.images[6].id;
+  std::vector<char> is_removed;
+  for (const Point3D& point : model.points3D) {
+    bool sees_wrong = false;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      sees_wrong |= model.track_elements[e].image_id == wrong;
+    }
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      is_removed.push_back(model.track_elements[e].image_id == alone &&
+                           !sees_wrong);
+    }
+  }
+  model = RemoveObservations(model, is_removed).model;
+  is_removed.clear();
+  for (const Point3D& point : model.points3D) {
+    bool sees_alone = false;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      sees_alone |= model.track_elements[e].image_id == alone;
+    }
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const ImageId id = model.track_elements[e].image_id;
+      is_removed.push_back(sees_alone && id != alone && id != wrong);
+    }
+  }
+  model = RemoveObservations(model, is_removed).model;
+  Turn(&model, 7, 20, {1, 2, 0});
+  const ModelCheck check = CheckModel(model, {}, {});
+  EXPECT_THAT(Images(check, ImageVerdict::kWrong), ElementsAre(wrong));
+  EXPECT_EQ(check.images[6].num_tested, 0);
+  EXPECT_EQ(check.images[6].verdict, ImageVerdict::kWeaklyHeld);
+}
+
 TEST(CheckModel, SaysNothingOfImagesWhereAllHaveFewObservations) {
   Model model = Scene(4, 10, 5);
   std::map<ImageId, int> num;

@@ -340,7 +340,7 @@ TEST(FilterOutliers, PlacesAModelWithoutPositions) {
 TEST(FilterOutliers, SparesWhatFitsTheModelsOwnPositionsAndNothingElse) {
   OutlierFilterOptions options;
   options.find_conflicts = false;
-  options.spares_what_fits = true;
+  options.spared = OutlierFilterOptions::Spared::kWhatFitsItsPositions;
   options.solve.init = SolveInit::kFeasible;
   for (const double ratio : {0.0, 0.1}) {
     const SyntheticScene scene = SynthesizeScene(Scene(ratio, 0));
@@ -350,11 +350,50 @@ TEST(FilterOutliers, SparesWhatFitsTheModelsOwnPositionsAndNothingElse) {
   }
 }
 
+// Where no positions are known the largest error says nothing by itself: what
+// noise explains goes to its least squares, which is nearer to the truth.
+TEST(SolveTolerantly, FromNothingLooksForTheLowestMaximumOnlyIfAsked) {
+  const SyntheticScene scene = SynthesizeScene(Scene(0, 0.02));
+  const Model model = Wiped(scene.model);
+  TolerantSolveOptions options;
+  options.solve.init = SolveInit::kFeasible;
+  const TolerantSolveResult result = SolveTolerantly(model, options, {});
+  EXPECT_EQ(result.summary.termination, SolveTermination::kWithinBound);
+  ASSERT_TRUE(result.outliers);
+  EXPECT_TRUE(result.outliers->removed.empty());
+  EXPECT_TRUE(result.outliers->is_within);
+
+  options.solve.describe_certificate = true;
+  const TolerantSolveResult proved = SolveTolerantly(model, options, {});
+  EXPECT_EQ(proved.summary.termination, SolveTermination::kGapReached);
+  EXPECT_FALSE(proved.outliers);
+  EXPECT_LT(proved.summary.cost_final, result.summary.cost_final);
+  EXPECT_LT(CentreError(scene.ground_truth, result.model),
+            CentreError(scene.ground_truth, proved.model));
+
+  const SolveModelResult alone = SolveModel(model, options.solve, {});
+  EXPECT_NEAR(alone.summary.LowestCost(), proved.summary.LowestCost(),
+              2e-4 * alone.summary.LowestCost());
+  EXPECT_LT(proved.summary.iterations.size(), alone.summary.iterations.size());
+}
+
+TEST(SolveModel, LooksForAStartWhereTheOneFoundIsTooFarOff) {
+  const Model model = Wiped(SynthesizeScene(Scene(0, 0)).model);
+  SolveModelOptions options;
+  options.init = SolveInit::kFeasible;
+  const SolveModelResult right = SolveModel(model, options, {});
+  BuildProblemOptions build;
+  build.ignore_translations = true;
+  options.found_start = BuildProblem(model, build).start;
+  const SolveModelResult result = SolveModel(model, options, {});
+  EXPECT_EQ(result.summary.cost_final, right.summary.cost_final);
+}
+
 TEST(FilterOutliers, PositionsMadeWithOtherRotationsSpareNothing) {
   const SyntheticScene scene = SynthesizeScene(Scene(0.1, 0));
   OutlierFilterOptions options;
   options.find_conflicts = false;
-  options.spares_what_fits = true;
+  options.spared = OutlierFilterOptions::Spared::kWhatFitsItsPositions;
   options.solve.init = SolveInit::kFeasible;
   options.solve.init_max_error = INFINITY;  // no error counts as gross
   for (const bool are_others : {false, true}) {

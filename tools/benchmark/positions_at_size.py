@@ -6,11 +6,12 @@
 KROT and BENCHMARK are the built programs. Makes rings of so many images (200,
 1000 and 5000 if none are given; 400 observations each, tracks of eight, noise
 of 1 px) with 0, 10 and 30 % of the observations wrong and rotations off by 0,
-0.3, 1 and 2 degrees (by 0.3 beyond 1000 images), lets `krot solver
---Solver.init feasible` find the positions and `krot bundle_adjuster` adjust
-them with a Cauchy loss; up to 1000 images also the rival of bearings
-(`krot_benchmark positioning`). Prints user and system CPU seconds, memory, and
-the RMS distance of the centres from the truth as a percentage of the radius.
+0.3, 1 and 2 degrees (by 0.3 beyond 1000 images), and no positions that fit,
+lets `krot solver --Solver.init feasible` find the positions and `krot
+bundle_adjuster` adjust them with a Cauchy loss; up to 1000 images also the
+rival of bearings (`krot_benchmark positioning`). Prints user and system CPU
+seconds, memory, and the RMS distance of the centres from the truth as a
+percentage of the radius.
 The Python standard library is enough.
 """
 
@@ -62,7 +63,8 @@ def measure(krot, benchmark, folder, images, share, turned):
                   "--Scene.track_length", "8",
                   "--Scene.camera_model", "PINHOLE", "--Scene.pixel_noise", "1",
                   "--Scene.outlier_ratio", str(share),
-                  "--Scene.rotation_noise_deg", str(turned))
+                  "--Scene.rotation_noise_deg", str(turned),
+                  "--Scene.start_translation_noise", "1")
     if code != 0:
         sys.exit(f"model_synthesizer ended with code {code}")
 

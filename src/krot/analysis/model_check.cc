@@ -197,7 +197,8 @@ class Checker {
         continue;
       }
       // Three observations determine a pose, and as many must check it.
-      if (image.num_tested - image.num_wrong < 6) {
+      // Those that only wrong images could check speak neither way.
+      if (image.num_observations - image.num_wrong < 6) {
         if (RelativeKept(n) < 1) few.push_back(n);
       } else if (ContradictionExponent(n) > LeastExponent(n) &&
                  (weakest < 0 ||
@@ -221,9 +222,10 @@ class Checker {
   }
 
   // The same for an image with few of its 2D points in tracks: the fewer they
-  // are, the less evidence is needed.
+  // are, the less evidence is needed, but never less than for one image.
   double LeastExponent(size_t n) const {
-    return LeastExponent() + std::min(0.0, std::log(RelativeKept(n)));
+    return std::max(-std::log(options_.false_alarm),
+                    LeastExponent() + std::min(0.0, std::log(RelativeKept(n))));
   }
 
   bool IsContradicted(size_t n) const {

@@ -30,6 +30,8 @@ std::vector<uint64_t> PointIds(const Model& model, const BuiltProblem& built,
 }
 
 class OutlierFilter : private Filtering {
+  using Spared = OutlierFilterOptions::Spared;
+
  public:
   OutlierFilter(const Model& model, const OutlierFilterOptions& options,
                 const Context& context)
@@ -71,15 +73,18 @@ class OutlierFilter : private Filtering {
     const RemovalStart start = FindRemovalStart(model_, options_, context_);
     const BuiltProblem& built = start.built;
     summary_.init = start.init;
-    if (options_.spares_what_fits &&
-        (start.fits_its_positions || start.nearly_fits)) {
+    const bool is_all_spared = options_.spared == Spared::kEverything;
+    if (is_all_spared ||
+        (options_.spared == Spared::kWhatFitsItsPositions &&
+         start.fits_its_positions)) {
       is_given_back_ = summary_.is_spared = true;
-      bound_.max_error = start.fits_its_positions ? 0 : start.max_error;
+      if (start.nearly_fits) summary_.spared_start = built.start;
       return;
     }
     bound_.max_error = start.max_error;
     summary_.is_bound_beyond_reason =
         !options_.max_error && start.max_error > options_.solve.init_max_error;
+    if (start.nearly_fits && (KeepsAll(built) || context_.IsCancelled())) return;
     const std::vector<uint64_t> elements = ElementsOf(model_, built);
     std::vector<Conflict> found;
     const std::optional<Removal> removal = RemoveFew(built, &found);
@@ -110,6 +115,23 @@ class OutlierFilter : private Filtering {
     std::vector<char> is_gone;
     for (const uint64_t e : kept_.element_of) is_gone.push_back(is_removed_[e]);
     RemoveMore(is_gone);
+  }
+
+  // Whether all observations can be within the bound that noise has chosen. If
+  // so, they are.
+  bool KeepsAll(const BuiltProblem& built) {
+    Model moved;
+    PlaceAt(built, {{}, built.start, {}}, &moved);
+    Solve(std::move(moved));
+    if (context_.IsCancelled()) return false;
+    const std::vector<double> errors =
+        PixelErrors(kept_.model, context_.num_threads);
+    if (!std::all_of(errors.begin(), errors.end(),
+                     [this](double error) { return IsWithin(error); })) {
+      return false;
+    }
+    FindWeakParts(built);
+    return true;
   }
 
   void FilterByThreshold() {
@@ -324,10 +346,10 @@ bool AllowsRemoval(const SolveModelOptions& options) {
 
 TolerantSolveResult SolveWithoutOutliers(const Model& model,
                                          const TolerantSolveOptions& options,
-                                         bool spares_what_fits,
+                                         OutlierFilterOptions::Spared spared,
                                          const Context& context) {
   OutlierFilterOptions filter = options;
-  filter.spares_what_fits = spares_what_fits;
+  filter.spared = spared;
   filter.solve.on_built = nullptr;
   filter.solve.find_lowest = options.solve.describe_certificate;
   OutlierFilterResult filtered = FilterOutliers(model, filter, context);
@@ -352,31 +374,32 @@ TolerantSolveResult SolveWithoutOutliers(const Model& model,
 TolerantSolveResult SolveTolerantly(const Model& model,
                                     const TolerantSolveOptions& options,
                                     const Context& context) {
+  using Spared = OutlierFilterOptions::Spared;
   if (options.max_error) {
-    return SolveWithoutOutliers(model, options, false, context);
+    return SolveWithoutOutliers(model, options, Spared::kNothing, context);
   }
   SolveModelOptions solve = options.solve;
   const bool allows_removal = AllowsRemoval(solve);
-  if (!allows_removal || solve.init != SolveInit::kFeasible ||
-      solve.describe_certificate) {
+  const bool is_from_nothing = solve.init == SolveInit::kFeasible;
+  if (!allows_removal || !is_from_nothing) {
     SolveModelResult solved = SolveModel(model, solve, context);
     if (!allows_removal ||
         solved.summary.termination != SolveTermination::kNothingToSolve) {
       return {std::move(solved.model), std::move(solved.summary), std::nullopt};
     }
   }
-  TolerantSolveResult result =
-      SolveWithoutOutliers(model, options, true, context);
+  const bool keeps_all = is_from_nothing && solve.describe_certificate;
+  TolerantSolveResult result = SolveWithoutOutliers(
+      model, options,
+      keeps_all ? Spared::kEverything : Spared::kWhatFitsItsPositions, context);
   if (!result.outliers->is_spared) return result;
-  // Perhaps all observations can stay: the lowest maximum tells.
   solve.init = SolveInit::kFeasible;
+  solve.found_start = std::move(result.outliers->spared_start);
   SolveModelResult solved = SolveModel(model, solve, context);
   const SolveTermination ended = solved.summary.termination;
-  const double explained = result.outliers->max_error;
-  if (ended == SolveTermination::kNoStart ||
-      ended == SolveTermination::kInfeasible ||
-      (explained > 0 && solved.summary.lower_bound.value_or(0) > explained)) {
-    return SolveWithoutOutliers(model, options, false, context);
+  if (!keeps_all && (ended == SolveTermination::kNoStart ||
+                     ended == SolveTermination::kInfeasible)) {
+    return SolveWithoutOutliers(model, options, Spared::kNothing, context);
   }
   return {std::move(solved.model), std::move(solved.summary), std::nullopt};
 }

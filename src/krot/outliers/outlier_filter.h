@@ -117,9 +117,9 @@ struct OutlierFilterOptions {
   bool has_other_rotations = false;
   bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
   bool find_conflicts = true;  // prove how many must go; takes most time
-  // From nothing, without max_error: whether the model is given back unsolved
-  // if perhaps nothing has to go (RemovalStart).
-  bool spares_what_fits = false;
+  // From nothing, without max_error: what is given back unsolved.
+  enum class Spared { kNothing, kWhatFitsItsPositions, kEverything };
+  Spared spared = Spared::kNothing;
   // How what is left is solved; errors are measured in its norm. With init
   // kFeasible the start comes from rotations and tracks alone, as for any model
   // whose cameras have no positions or all the same one.
@@ -169,9 +169,9 @@ struct OutlierFilterSummary {
   // Whether the bound, chosen by noise, is above what a start may have
   // (SolveModelOptions::init_max_error).
   bool is_bound_beyond_reason = false;
-  // Whether the model was given back unsolved (spares_what_fits). Then
-  // max_error is what noise explains, or 0 where that does not matter.
+  // Whether the model was given back unsolved (OutlierFilterOptions::spared).
   bool is_spared = false;
+  std::optional<Estimate> spared_start;  // if it nearly fits (RemovalStart)
 
   int64_t num_observations = 0;  // of the input
   int64_t num_points = 0;
@@ -310,9 +310,9 @@ RemovalStart FindRemovalStart(const Model& model,
 // solver` does between reading and writing.
 //
 // With max_error a few observations are removed so that all others keep it.
-// Without it all stay, unless the start is from nothing and noise does not
-// explain the lowest maximum (RemovalStart); then the observations that noise
-// does not explain are removed. If a certificate is asked for, this is only so
+// Without it all stay, unless the start is from nothing and the model has no
+// positions that fit (RemovalStart); then noise chooses a bound, and what noise
+// does not explain is removed. If a certificate is asked for, this is only so
 // for a model of which SolveModel serves no observation.
 
 struct TolerantSolveOptions : OutlierFilterOptions {

@@ -219,8 +219,10 @@ RemovalStart FindRemovalStart(const Model& model,
     start.fits_its_positions =
         !options.has_other_rotations &&
         FitsItsPositions(model, options, context, start.max_error);
-    if (options.spares_what_fits &&
-        (start.nearly_fits || start.fits_its_positions)) {
+    using Spared = OutlierFilterOptions::Spared;
+    if (options.spared == Spared::kEverything ||
+        (options.spared == Spared::kWhatFitsItsPositions &&
+         start.fits_its_positions)) {
       return start;
     }
     context.Note("leaving out what noise of " + Pixels(noise.sigma) +

@@ -37,6 +37,7 @@ class Rounds {
         summary_(*summary),
         positions_(model, options_, context_, reprojection_, estimate_, built),
         cost_(LevelledCost(estimate_)),
+        sufficient_cost_(SufficientCost(options, method)),
         bounds_(options.joint.relative_gap) {
     if (positions_.Any()) {
       rows_options_.joint.relative_gap *= 0.05;
@@ -54,6 +55,11 @@ class Rounds {
     while (RunOne() && summary_.rounds.size() < 30) {
     }
     if (IsRefuted()) return;
+    if (IsSufficient(cost_) && !IsInterrupted()) {
+      summary_.cost_final = cost_;
+      summary_.termination = SolveTermination::kWithinBound;
+      return;
+    }
     if (!certificate() && !IsInterrupted()) Prove();
     if (std::isfinite(positions_.cost())) {
       estimate_ = positions_.estimate();
@@ -114,12 +120,17 @@ class Rounds {
             options_.res_int.update_frames);
   }
 
+  bool IsSufficient(double cost) const { return cost < sufficient_cost_; }
+
   // Whether sweeps came so far that solving the rows would be in vain: because
-  // the cost is near enough to a bound, or because the rows no longer describe
-  // the true errors.
+  // the cost is enough or near enough to a bound, or because the rows no longer
+  // describe the true errors.
   bool HaveRowsServed(const Estimate& swept, double linear_cost) {
-    if (reprojection_.IsLinear() || positions_.Any()) return false;
+    if (positions_.Any()) return false;
+    if (reprojection_.IsLinear() && sufficient_cost_ == 0) return false;
     const double cost = TrueCost(swept);
+    if (IsSufficient(cost)) return true;
+    if (reprojection_.IsLinear()) return false;
     is_bound_near_ = bounds_.IsNear(cost);
     return is_bound_near_ ||
            (cost <= kFarFromRows * cost_ && linear_cost <= kFarFromRows * cost);
@@ -204,6 +215,7 @@ class Rounds {
         options_.res_int.fast_descent.settings == FastDescentSettings::kPaper;
     if (reprojection_.IsLinear() || is_as_in_paper || IsUsedUp() ||
         IsRefuted() || IsInterrupted() || IsGapReached() ||
+        IsSufficient(cost_) ||
         IsZeroUpToRounding(cost_)) {
       return false;
     }
@@ -263,6 +275,7 @@ class Rounds {
   SolveSummary& summary_;
   KeptPositions positions_;
   double cost_;  // LevelledCost of the estimate, pixels
+  const double sufficient_cost_;
   TrustRegions trust_;
   int num_idle_rounds_ = 0;
   RoundBounds bounds_;

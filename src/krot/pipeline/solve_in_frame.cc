@@ -127,6 +127,12 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
     *estimate = start->built.start;
     return true;
   }
+  if (options.found_start &&
+      Cost(start->built.problem, *options.found_start, options.norm,
+           context.num_threads) < options.init_max_error) {
+    *estimate = *options.found_start;
+    return true;
+  }
   // If there is no start, rows of this level prove a bound for the positions:
   // their level must be below it.
   TakePositionRowsOfStart(0.99 * options.init_max_error, &start->built);
@@ -154,21 +160,18 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   return !start->built.problem.observations.empty();
 }
 
-// Whether the finish can start right away: the lowest maximum is not asked for,
-// and the estimate is below the cap. If so, takes the rows at the estimate.
+// Whether the finish can start right away. If so, takes the rows at the
+// estimate.
 bool IsFinishEnough(const Model& model, const SolveModelOptions& options,
                     const Context& context, const Estimate& estimate,
                     BuiltProblem* built, SolveSummary* summary) {
-  if (options.find_lowest || summary->method != SolveMethod::kAuto ||
-      options.finish.finish != Finish::kLeastSquares ||
-      !options.finish.max_error || !built->positions.empty()) {
-    return false;
-  }
+  const double sufficient = SufficientCost(options, summary->method);
+  if (sufficient == 0) return false;
   const Reprojection reprojection(model, *built);
   const double cost = MaxOfRanks(
       context,
       reprojection.TrueCost(estimate, options.norm, context.num_threads));
-  if (!(cost < (1 - kLeastRoom) * *options.finish.max_error)) return false;
+  if (!(cost < sufficient)) return false;
   reprojection.TakeRows(estimate, context.num_threads, &built->problem);
   summary->cost_initial = summary->cost_final = cost;
   summary->termination = SolveTermination::kWithinBound;

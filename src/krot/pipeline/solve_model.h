@@ -233,6 +233,11 @@ struct SolveModelOptions {
   SolveMethod method = SolveMethod::kAuto;
   SolveInit init = SolveInit::kModel;
   double init_max_error = 100;        // of a start; pixels; > 0
+  // For kFeasible, with neither fixed parts nor known positions: where to start
+  // if all residuals there are below init_max_error. Otherwise, as without it, a
+  // start is looked for. Of the problem that is built without the model's own
+  // positions.
+  std::optional<Estimate> found_start;
   bool describe_certificate = false;  // fill SolveSummary::certificate
   BuildProblemOptions problem;
   // If given, pixels: the radii of problem.positions are multiplied by the
@@ -258,8 +263,8 @@ struct SolveModelOptions {
 
   FinishOptions finish;  // of kAuto
   // For kAuto with a finish by least squares below finish.max_error: whether
-  // the lowest maximum is found and proved first. If not, a start that is
-  // already below max_error goes straight to the finish.
+  // the lowest maximum is found and proved first. If not, the finish begins as
+  // soon as all errors are below max_error.
   bool find_lowest = true;
 
   // Used by all stages instead of the one in their own options; null: none.

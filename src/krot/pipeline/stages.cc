@@ -153,6 +153,13 @@ std::optional<Certificate> SolveRows(
   return schedule.Joint(known);
 }
 
+double SufficientCost(const SolveModelOptions& options, SolveMethod method) {
+  const bool is_asked = options.find_lowest || method != SolveMethod::kAuto ||
+                        options.finish.finish != Finish::kLeastSquares ||
+                        !options.problem.positions.empty();
+  return is_asked ? 0 : (1 - kLeastRoom) * options.finish.max_error.value_or(0);
+}
+
 const char* FinishName(Finish finish) {
   return finish == Finish::kNone ? "none" : "least_squares";
 }

@@ -182,6 +182,10 @@ void CertifyInfeasible(const Model& model, const BuiltProblem& built,
 // have no room to move.
 inline constexpr double kLeastRoom = 1e-6;
 
+// The error below which a finish can start without a search for the lowest
+// maximum; 0 if that is to be found.
+double SufficientCost(const SolveModelOptions& options, SolveMethod method);
+
 // Runs the finish that the options ask for, from an estimate whose largest true
 // error is as low as it gets: the least squares of true errors below a cap. The
 // cap is max_error or, without that, (1 + slack) times the lowest maximum, but

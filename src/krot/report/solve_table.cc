@@ -155,8 +155,12 @@ std::string SolveEndSentence(const SolveSummary& summary) {
     case SolveTermination::kZeroCost:
       return "Ended" + after + " with nothing left to lower.";
     case SolveTermination::kWithinBound:
-      return "Every error is within the bound. The lowest maximum was not "
-             "looked for; --certificate_path does that.";
+      return "Every error is within the bound" +
+             (summary.finish
+                  ? " of " + FormatNumber(summary.finish->cap, 4) + " px"
+                  : std::string()) +
+             ". The lowest maximum was not looked for; --certificate_path does "
+             "that.";
     case SolveTermination::kCollapsed:
       return "Ended" + after + " in a collapse of the scene.";
     case SolveTermination::kMaxSweeps:
