@@ -46,7 +46,8 @@ class Interrupt : public ::testing::Test {
   KrotResult SignalOnTheWayToAStart() const {
     KrotProcess process({"solver", "--input_path", folder_ / "model",
                          "--output_path", folder_ / "model", "--overwrite", "1",
-                         "--Solver.init", "feasible"});
+                         "--Solver.init", "feasible", "--Solver.method",
+                         "joint"});
     process.WaitForErrorText("iteration 1: looking for a start below");
     process.Signal(SIGINT);
     return process.Wait();
@@ -100,18 +101,22 @@ TEST_F(Interrupt, WritesTheBestEstimateSoFarIfAsked) {
 }
 
 TEST_F(Interrupt, BeforeThereIsAnEstimateWritesNothingEvenIfAsked) {
-  KrotProcess process({"solver", "--input_path", folder_ / "model",
-                       "--output_path", folder_ / "model", "--overwrite", "1",
-                       "--Solver.init", "feasible", "--write_on_interrupt",
-                       "1"});
-  process.WaitForErrorText("iteration 1: looking for a start below");
-  process.Signal(SIGTERM);
-  const KrotResult result = process.Wait();
-  EXPECT_EQ(result.exit_code, 130);
-  EXPECT_THAT(result.err,
-              ::testing::EndsWith("before there was an estimate, nothing was "
-                                  "written\n"));
-  ExpectNothingChanged();
+  for (const auto& [method, words] :
+       {std::pair("joint", "iteration 1: looking for a start below"),
+        std::pair("auto", "programme: 1 of 2")}) {
+    KrotProcess process({"solver", "--input_path", folder_ / "model",
+                         "--output_path", folder_ / "model", "--overwrite", "1",
+                         "--Solver.init", "feasible", "--Solver.method", method,
+                         "--write_on_interrupt", "1"});
+    process.WaitForErrorText(words);
+    process.Signal(SIGTERM);
+    const KrotResult result = process.Wait();
+    EXPECT_EQ(result.exit_code, 130);
+    EXPECT_THAT(result.err,
+                ::testing::EndsWith("before there was an estimate, nothing was "
+                                    "written\n"));
+    ExpectNothingChanged();
+  }
 }
 
 TEST_F(Interrupt, OnTheWayToAStartDoesTheSame) {

@@ -302,6 +302,7 @@ TEST_F(Known, CoordinatesFarAwayShiftTheResultAndNothingElse) {
       {"solver"},
       {"solver", "--Solver.method", "res_int"},
       {"solver", "--Solver.init", "feasible"},
+      {"solver", "--Solver.init", "feasible", "--Solver.max_error", "1.2"},
       {"solver", "--fixed_images_path", folder_ / "images.txt"},
       {"point_triangulator"},
       {"outlier_filter", "--OutlierFilter.max_error", "1.2"},

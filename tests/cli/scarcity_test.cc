@@ -46,7 +46,8 @@ TEST_F(Scarcity, OfWhatASolveNeedsIsSeenBeforeItBegins) {
   Save(SynthesizeScene(options).model, folder_ / "input");
   const KrotResult result =
       RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
-               folder_ / "output", "--Solver.init", "feasible"},
+               folder_ / "output", "--Solver.init", "feasible",
+               "--Solver.method", "joint"},
               150 * kMegabyte);
   EXPECT_EQ(result.exit_code, 6);
   EXPECT_THAT(result.err,

@@ -262,9 +262,18 @@ TEST_F(Commands, SolverNeedsNoTranslations) {
     const double cost = Report()["cost_final"];
     Save(WithoutTranslations(model), folder_ / "input");
     for (const char* init : {"model", "feasible"}) {
-      const KrotResult result =
+      const KrotResult within =
           Run("solver", {"--Solver.init", init, "--overwrite", "1"});
-      ASSERT_EQ(result.exit_code, 0) << result.err;
+      ASSERT_EQ(within.exit_code, 0) << within.err;
+      EXPECT_EQ(Report()["termination"], "within_bound");
+      EXPECT_EQ(Report()["num_observations"], model.track_elements.size());
+      EXPECT_GT(Report()["cost_final"], cost);
+      EXPECT_THAT(within.out, ::testing::HasSubstr("removed 0 of"));
+
+      const KrotResult lowest =
+          Run("solver", {"--Solver.init", init, "--overwrite", "1",
+                         "--certificate_path", folder_ / "proof.json"});
+      ASSERT_EQ(lowest.exit_code, 0) << lowest.err;
       EXPECT_EQ(Report()["certified"], true);
       EXPECT_EQ(Report()["num_observations"], model.track_elements.size());
       EXPECT_NEAR(Report()["cost_final"], cost, 2e-4 * cost);
