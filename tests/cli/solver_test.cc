@@ -262,24 +262,31 @@ TEST_F(Commands, SolverNeedsNoTranslations) {
     const double cost = Report()["cost_final"];
     Save(WithoutTranslations(model), folder_ / "input");
     for (const char* init : {"model", "feasible"}) {
-      const KrotResult within =
-          Run("solver", {"--Solver.init", init, "--overwrite", "1"});
-      ASSERT_EQ(within.exit_code, 0) << within.err;
-      EXPECT_EQ(Report()["termination"], "within_bound");
-      EXPECT_EQ(Report()["num_observations"], model.track_elements.size());
-      EXPECT_GT(Report()["cost_final"], cost);
-      EXPECT_THAT(within.out, ::testing::HasSubstr("removed 0 of"));
-
-      const KrotResult lowest =
+      const KrotResult result =
           Run("solver", {"--Solver.init", init, "--overwrite", "1",
                          "--certificate_path", folder_ / "proof.json"});
-      ASSERT_EQ(lowest.exit_code, 0) << lowest.err;
+      ASSERT_EQ(result.exit_code, 0) << result.err;
       EXPECT_EQ(Report()["certified"], true);
       EXPECT_EQ(Report()["num_observations"], model.track_elements.size());
       EXPECT_NEAR(Report()["cost_final"], cost, 2e-4 * cost);
       EXPECT_NO_THROW(Load(folder_ / "output"));
     }
   }
+}
+
+TEST_F(Commands, SolverFromNothingTakesItsBoundFromTheNoise) {
+  const Model model = SynthesizeScene(SmallScene()).model;
+  Save(WithoutTranslations(model), folder_ / "input");
+  const KrotResult lowest = Run("solver", {"--overwrite", "1"});
+  ASSERT_EQ(lowest.exit_code, 0) << lowest.err;
+  const double cost = Report()["cost_final"];
+  const KrotResult within =
+      Run("solver", {"--Solver.init", "feasible", "--overwrite", "1"});
+  ASSERT_EQ(within.exit_code, 0) << within.err;
+  EXPECT_EQ(Report()["termination"], "within_bound");
+  EXPECT_EQ(Report()["num_observations"], model.track_elements.size());
+  EXPECT_GT(Report()["cost_final"], cost);
+  EXPECT_THAT(within.out, ::testing::HasSubstr("removed 0 of"));
 }
 
 TEST_F(Commands, SolverProvesThatNoStartIsBelowABound) {

@@ -1,9 +1,6 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/Core>
-
-#include "krot/geometry.h"
 #include "krot/outliers/outlier_filter.h"
 
 namespace krot::internal {
@@ -40,18 +37,6 @@ TolerantSolveResult SolveWithoutOutliers(const Model& model,
   return result;
 }
 
-// Whether frames stand in different places.
-bool HasPositions(const Model& model) {
-  std::optional<Eigen::Vector3d> first;
-  for (const Frame& frame : model.frames) {
-    const Eigen::Vector3d center = Center(frame.rig_from_world.Transform());
-    if (!center.allFinite()) continue;
-    if (first && center != *first) return true;
-    first = center;
-  }
-  return first && model.frames.size() < 2;
-}
-
 }  // namespace
 
 TolerantSolveResult SolveTolerantly(const Model& model,
@@ -61,11 +46,9 @@ TolerantSolveResult SolveTolerantly(const Model& model,
   if (options.max_error) {
     return SolveWithoutOutliers(model, options, Spared::kNothing, context);
   }
-  TolerantSolveOptions own = options;
-  SolveModelOptions& solve = own.solve;
+  SolveModelOptions solve = options.solve;
   const bool allows_removal = AllowsRemoval(solve);
-  const bool is_from_nothing =
-      solve.init == SolveInit::kFeasible || !HasPositions(model);
+  const bool is_from_nothing = solve.init == SolveInit::kFeasible;
   if (!allows_removal || !is_from_nothing) {
     SolveModelResult solved = SolveModel(model, solve, context);
     if (!allows_removal ||
@@ -74,9 +57,8 @@ TolerantSolveResult SolveTolerantly(const Model& model,
     }
   }
   const bool keeps_all = is_from_nothing && solve.describe_certificate;
-  if (is_from_nothing) solve.init = SolveInit::kFeasible;
   TolerantSolveResult result = SolveWithoutOutliers(
-      model, own,
+      model, options,
       keeps_all ? Spared::kEverything : Spared::kWhatFitsItsPositions, context);
   if (!result.outliers->is_spared) return result;
   solve.init = SolveInit::kFeasible;
@@ -85,7 +67,7 @@ TolerantSolveResult SolveTolerantly(const Model& model,
   const SolveTermination ended = solved.summary.termination;
   if (!keeps_all && (ended == SolveTermination::kNoStart ||
                      ended == SolveTermination::kInfeasible)) {
-    return SolveWithoutOutliers(model, own, Spared::kNothing, context);
+    return SolveWithoutOutliers(model, options, Spared::kNothing, context);
   }
   return {std::move(solved.model), std::move(solved.summary), std::nullopt};
 }
