@@ -11,8 +11,7 @@ lets `krot solver --Solver.init feasible` find the positions and `krot
 bundle_adjuster` adjust them with a Cauchy loss; up to 1000 images also the
 rival of bearings (`krot_benchmark positioning`). Prints user and system CPU
 seconds, memory, and the RMS distance of the centres from the truth as a
-percentage of the radius.
-The Python standard library is enough.
+percentage of the radius. The Python standard library is enough.
 """
 
 import json

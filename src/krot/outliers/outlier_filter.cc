@@ -53,9 +53,7 @@ class OutlierFilter : private Filtering {
     }
     const std::vector<double> errors = Describe();
     UpdatePointErrors(errors, &kept_.model);
-    summary_.is_within =
-        std::all_of(errors.begin(), errors.end(),
-                    [this](double error) { return IsWithin(error); });
+    summary_.is_within = AreWithin(errors);
     if (options_.solve.polish != Polish::kNone && summary_.solve) {
       summary_.solve->polish =
           PolishModel(options_.solve.polish, options_.solve.finish.loss,
@@ -67,6 +65,11 @@ class OutlierFilter : private Filtering {
  private:
   bool IsWithin(double error) const {  // rounding counts for nothing
     return error <= (1 + 1e-9) * bound_.max_error;
+  }
+
+  bool AreWithin(const std::vector<double>& errors) const {
+    return std::all_of(errors.begin(), errors.end(),
+                       [this](double error) { return IsWithin(error); });
   }
 
   void FilterByConflicts() {
@@ -124,10 +127,7 @@ class OutlierFilter : private Filtering {
     PlaceAt(built, {{}, built.start, {}}, &moved);
     Solve(std::move(moved));
     if (context_.IsCancelled()) return false;
-    const std::vector<double> errors =
-        PixelErrors(kept_.model, context_.num_threads);
-    if (!std::all_of(errors.begin(), errors.end(),
-                     [this](double error) { return IsWithin(error); })) {
+    if (!AreWithin(PixelErrors(kept_.model, context_.num_threads))) {
       return false;
     }
     FindWeakParts(built);
