@@ -136,23 +136,22 @@ struct alignas(64) LanePiece {
 
 // Indices in place of a residual's, as doubles in lanes: of the zero piece (no
 // residual falls below 0), and of no piece.
-enum PieceIndex { kZeroPieceIndex = -1, kNoPieceIndex = -2 };
+inline constexpr double kZeroPieceIndex = -1;
+inline constexpr double kNoPieceIndex = -2;
 // The largest number of active pieces.
 inline constexpr int kCorners = 4;
 
-// The status of a lane's problem, a double in lanes.
-enum LaneStatus {
-  kLaneIdle,   // the lane has no problem
-  kLaneFresh,  // not evaluated yet
-  kLaneRuns,
-  // The problem has ended, like a NewtonDescent:
-  kLaneStationary,
-  kLaneZeroCost,
-  kLaneLowEnough,
-  kLaneBehind,
-  // Not for lanes: the minimiser is far away, or it takes too many steps.
-  kLaneGivesUp,
-};
+// The status of a lane's problem, a number as lanes hold it.
+inline constexpr double kLaneIdle = 0;   // the lane has no problem
+inline constexpr double kLaneFresh = 1;  // not evaluated yet
+inline constexpr double kLaneRuns = 2;
+// The problem has ended, like a NewtonDescent:
+inline constexpr double kLaneStationary = 3;
+inline constexpr double kLaneZeroCost = 4;
+inline constexpr double kLaneLowEnough = 5;
+inline constexpr double kLaneBehind = 6;
+// Not for lanes: the minimiser is far away, or it takes too many steps.
+inline constexpr double kLaneGivesUp = 7;
 
 // DescentGoal (newton_descent.h) and the limit of iterations.
 struct LaneGoal {

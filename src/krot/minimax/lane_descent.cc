@@ -37,7 +37,7 @@ class Stepping {
   void Try();
   void Decide();
   void Learn(const LaneMask& learns);
-  void SetStatus(const LaneMask& where, LaneStatus status) {
+  void SetStatus(const LaneMask& where, double status) {
     status_ = Select(where, status, status_);
   }
   void StoreDescents();
