@@ -229,6 +229,66 @@ TEST(FindRobustStart, HoldsTheScaleOfPartsThatTenTracksJoinHalfOfThemWrong) {
   }
 }
 
+// 200 images along a path, three tenths of the observations wrong.
+SyntheticScene LongStreet() {
+  SceneOptions options = Scene(0.3, 0.3);
+  options.layout = SceneLayout::kStreet;
+  options.num_frames = 200;
+  options.num_points = 10000;
+  options.track_length = 8;
+  options.pixel_noise = 1;
+  options.random_seed = 0;
+  return SynthesizeScene(options);
+}
+
+TEST(FindRobustStart, JoinsAgainWhatTracksThatDisagreeDidNotHold) {
+  const SyntheticScene scene = LongStreet();
+  EXPECT_LT(CentreError(scene.ground_truth, AtRobustStart(Wiped(scene.model))),
+            0.01);
+}
+
+TEST(FilterOutliers, TellsNoiseFromWrongObservationsInNearlyEveryTrack) {
+  SceneOptions options = Scene(0.4, 0);
+  options.num_points = 2000;
+  options.track_length = 8;
+  const SyntheticScene scene = SynthesizeScene(options);
+  OutlierFilterOptions filter;
+  filter.find_conflicts = false;
+  const OutlierFilterResult result =
+      FilterOutliers(Wiped(scene.model), filter, {});
+  // What Gaussian noise of half a pixel per axis explains, and a third more.
+  EXPECT_LT(result.summary.max_error,
+            1.3 * 0.5 * std::sqrt(2 * std::log(16000 / 0.05)));
+  EXPECT_GT(result.summary.max_error, 0.5 * std::sqrt(2 * std::log(16000)));
+  EXPECT_LT(CentreError(scene.ground_truth, result.model), 0.005);
+}
+
+TEST(FindWeakLinks, SaysThatTracksLeftOutHoldNothing) {
+  SceneOptions options = SceneInParts(SceneLayout::kStreet);
+  options.outlier_ratio = 0;
+  options.num_points = 400;
+  const BuiltProblem built =
+      BuildProblem(SynthesizeScene(options).ground_truth, {});
+  const KnownRotationProblem& problem = built.problem;
+  const auto part_of = [&](int64_t i) { return problem.FrameOf(i) / 12; };
+  std::vector<char> kept;
+  for (size_t i = 0; i < problem.observations.size(); ++i) {
+    const auto own = static_cast<int64_t>(i);
+    const int32_t k = problem.observations[i].point;
+    kept.push_back(part_of(own) == part_of(problem.point_begin[k]));
+  }
+  Estimate torn = built.start;
+  for (int32_t f = 12; f < 24; ++f) torn.translations[f] *= 0.1;
+  const std::vector<char> all(kept.size(), 1);
+  EXPECT_TRUE(FindWeakLinks(problem, torn, all, 8, {}).empty());
+  const std::vector<WeakLink> links =
+      FindWeakLinks(problem, torn, kept, 8, {});
+  ASSERT_EQ(links.size(), 1u);
+  EXPECT_FALSE(links[0].IsHeld());
+  EXPECT_EQ(links[0].frames.size(), 12u);
+  EXPECT_GT(links[0].scale_factor, 5);
+}
+
 TEST(FilterOutliers, SaysHowWellFewTracksHoldTheScale) {
   const auto scale_factors = [](int num_tracks, int num_wrong) {
     const SyntheticScene scene =

@@ -77,9 +77,8 @@ class OutlierFilter : private Filtering {
     const BuiltProblem& built = start.built;
     summary_.init = start.init;
     const bool is_all_spared = options_.spared == Spared::kEverything;
-    if (is_all_spared ||
-        (options_.spared == Spared::kWhatFitsItsPositions &&
-         start.fits_its_positions)) {
+    if (is_all_spared || (options_.spared == Spared::kWhatFitsItsPositions &&
+                          start.fits_its_positions)) {
       is_given_back_ = summary_.is_spared = true;
       if (start.nearly_fits) summary_.spared_start = built.start;
       return;
@@ -87,7 +86,8 @@ class OutlierFilter : private Filtering {
     bound_.max_error = start.max_error;
     summary_.is_bound_beyond_reason =
         !options_.max_error && start.max_error > options_.solve.init_max_error;
-    if (start.nearly_fits && (KeepsAll(built) || context_.IsCancelled())) return;
+    if (start.nearly_fits && (KeepsAll(built) || context_.IsCancelled()))
+      return;
     const std::vector<uint64_t> elements = ElementsOf(model_, built);
     std::vector<Conflict> found;
     const std::optional<Removal> removal = RemoveFew(built, &found);
@@ -281,8 +281,12 @@ class OutlierFilter : private Filtering {
       estimate.translations[f] =
           kept_.model.frames[built.frame_of[f]].rig_from_world.translation;
     }
+    std::vector<char> kept;
+    for (const uint64_t e : ElementsOf(model_, built)) {
+      kept.push_back(!is_removed_[e]);
+    }
     for (const WeakLink& link :
-         FindWeakLinks(built.problem, estimate,
+         FindWeakLinks(built.problem, estimate, kept,
                        kCapOfPoints * std::min(bound_.max_error, kLevelOfStart),
                        context_)) {
       WeakPart& part = summary_.weak_parts.emplace_back();

@@ -10,6 +10,7 @@
 
 #include "krot/base/disjoint_sets.h"
 #include "krot/base/parallel_for.h"
+#include "krot/problem/subset.h"
 
 namespace krot::internal {
 
@@ -123,6 +124,18 @@ void KeepStrongest(size_t num_groups, std::vector<GroupPair>* pairs) {
   *pairs = std::move(kept);
 }
 
+// Numbers parts from 0 in the order of their first frames.
+void NumberInOrder(std::vector<int32_t>* part_of) {
+  const int32_t most = *std::max_element(part_of->begin(), part_of->end());
+  std::vector<int32_t> number(most + 1, -1);
+  int32_t count = 0;
+  for (int32_t& part : *part_of) {
+    int32_t& own = number[part];
+    if (own < 0) own = count++;
+    part = own;
+  }
+}
+
 }  // namespace
 
 void SortStrongestFirst(std::vector<GroupPair>* pairs) {
@@ -177,13 +190,30 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
     find_all();
     groups.Merge(part_of);
   }
-  std::vector<int32_t> number(problem.num_frames, -1);
-  int32_t count = 0;
-  for (int32_t f = 0; f < problem.num_frames; ++f) {
-    int32_t& own = number[part_of[f]];
-    if (own < 0) own = count++;
-    part_of[f] = own;
+  NumberInOrder(&part_of);
+  return part_of;
+}
+
+std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
+                               const std::vector<char>& agrees,
+                               const PartOptions& options) {
+  std::vector<int32_t> num_agreeing(problem.num_frames, 0);
+  const auto count = static_cast<int64_t>(agrees.size());
+  for (int64_t i = 0; i < count; ++i) {
+    num_agreeing[problem.FrameOf(i)] += agrees[i];
   }
+  std::vector<int64_t> ties;
+  for (int64_t i = 0; i < count; ++i) {
+    if (agrees[i] || num_agreeing[problem.FrameOf(i)] < 6) ties.push_back(i);
+  }
+  const ProblemSubset subset(problem, std::move(ties));
+  const KnownRotationProblem& own = subset.problem();
+  const std::vector<int32_t> parts = FindParts(own, options);
+  std::vector<int32_t> part_of(problem.num_frames);
+  for (int64_t i = 0; i < static_cast<int64_t>(own.observations.size()); ++i) {
+    part_of[problem.FrameOf(subset.InWhole(i))] = parts[own.FrameOf(i)];
+  }
+  NumberInOrder(&part_of);
   return part_of;
 }
 

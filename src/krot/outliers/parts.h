@@ -102,6 +102,11 @@ struct PartOptions {
 // their squared lengths), a dozen times.
 std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
                                const PartOptions& options);
+// The same if only some observations tie frames, which `agrees` marks. A frame
+// of which hardly any is marked is tied by all of its own.
+std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
+                               const std::vector<char>& agrees,
+                               const PartOptions& options);
 
 // The 99.9 % quantile of chi-squared of three degrees of freedom: one right
 // track in a thousand exceeds it.
@@ -247,10 +252,12 @@ std::vector<WeakLink> JoinParts(const KnownRotationProblem& problem,
 
 // The same links of an estimate that is complete already, of which only the
 // translations are used: how much could the scales differ from the estimate's?
+// Parts are those that the `kept` observations (marked) tie; all judge links.
 // For every connected component; none where no part hangs on few tracks. Points
 // are placed anew, and no error counts for more than `cap`, pixels.
 std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
-                                    const Estimate& estimate, double cap,
+                                    const Estimate& estimate,
+                                    const std::vector<char>& kept, double cap,
                                     const Context& context);
 
 }  // namespace krot::internal

@@ -8,8 +8,10 @@
 
 #include "krot/analysis/noise.h"
 #include "krot/base/check.h"
+#include "krot/base/numbers.h"
 #include "krot/convert/reprojection.h"
 #include "krot/finish/least_squares.h"
+#include "krot/model/derived_models.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/robust_start.h"
@@ -127,6 +129,30 @@ NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
   return limit;
 }
 
+// LimitOf for positions that fit more than half of the observations. Where most
+// tracks have a wrong one, their least squares fit none, and sigma would be
+// that of wrong ones: then gross errors go first.
+NoiseLimit LimitOfFitting(const Model& model, Norm norm,
+                          const Context& context) {
+  const NoiseLimit limit = LimitOf(model, norm, context);
+  const std::vector<double> errors = PixelErrors(model, context.num_threads);
+  std::vector<double> of_noise;  // as if no point had been fitted
+  for (const Point3D& point : model.points3D) {
+    const auto rows =
+        2 * static_cast<double>(point.track_end - point.track_begin);
+    if (rows < 6) continue;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      of_noise.push_back(errors[e] * std::sqrt(rows / (rows - 3)));
+    }
+  }
+  if (of_noise.empty()) return limit;
+  const double gross = 10 * Median(std::move(of_noise));
+  if (!(limit.sigma > gross)) return limit;
+  std::vector<char> is_gross;
+  for (const double error : errors) is_gross.push_back(!(error <= gross));
+  return LimitOf(RemoveObservations(model, is_gross).model, norm, context);
+}
+
 }  // namespace
 
 NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
@@ -135,9 +161,8 @@ NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
   context.Stage("measuring the noise");
   Estimate robust = FindRobustStart(
       built.problem, norm, std::min(kLevelOfStart, own.max_error), context);
-  MinimizeRobustly(built.problem, context, &robust);
   const NoiseLimit limit =
-      LimitOf(ApplyEstimate(model, built, robust), norm, context);
+      LimitOfFitting(ApplyEstimate(model, built, robust), norm, context);
   const bool is_lower = limit.sigma > 0 && !(limit.sigma >= own.sigma);
   return is_lower || own.sigma == 0 ? limit : own;
 }
@@ -165,7 +190,6 @@ void PlaceFromTracks(Norm norm, double level, const Context& context,
   start->init = SolveInit::kFeasible;
   const KnownRotationProblem& problem = start->built.problem;
   start->built.start = FindRobustStart(problem, norm, level, context);
-  MinimizeRobustly(problem, context, &start->built.start);
   context.Note("positions from rotations and tracks: the median error is " +
                Pixels(MedianError(problem, start->built.start, norm)));
 }
@@ -207,7 +231,7 @@ RemovalStart FindRemovalStart(const Model& model,
   }
   if (start.init == SolveInit::kFeasible && !options.max_error &&
       !options.make_profile) {
-    const NoiseLimit noise = LimitOf(
+    const NoiseLimit noise = LimitOfFitting(
         ApplyEstimate(model, start.built, start.built.start), norm, context);
     start.max_error = noise.max_error;
     const double largest =

@@ -249,63 +249,6 @@ Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
   return estimate;
 }
 
-// For every part its observations of the points that it observes at least
-// twice.
-std::vector<std::vector<int64_t>> SplitIntoParts(
-    const KnownRotationProblem& problem, const std::vector<int32_t>& part_of) {
-  std::vector<std::vector<int64_t>> split(
-      *std::max_element(part_of.begin(), part_of.end()) + 1);
-  for (int32_t k = 0; k < problem.num_points; ++k) {
-    for (const int64_t i : problem.OfPoint(k)) {
-      const int32_t own = part_of[problem.FrameOf(i)];
-      int num_own = 0;
-      for (const int64_t j : problem.OfPoint(k)) {
-        num_own += part_of[problem.FrameOf(j)] == own;
-      }
-      if (num_own >= 2) split[own].push_back(i);
-    }
-  }
-  return split;
-}
-
-// Parts are placed one by one, each with its own scale, and then joined.
-Estimate StartOfParts(const KnownRotationProblem& problem,
-                      const std::vector<int32_t>& part_of, Norm norm,
-                      double level, const Context& context) {
-  const std::vector<std::vector<int64_t>> split =
-      SplitIntoParts(problem, part_of);
-  Estimate estimate = AllAtZero(problem);
-  std::vector<int32_t> point_part(problem.num_points, -1);
-  for (size_t n = 0; n < split.size(); ++n) {
-    if (split[n].empty()) continue;
-    const ProblemSubset part(problem, split[n]);
-    const Context within =
-        context.Within("part " + std::to_string(n + 1) + " of " +
-                       std::to_string(split.size()));
-    Estimate own = StartOfPart(part.problem(), norm, level, within);
-    MinimizeRobustly(part.problem(), within, &own);
-    if (!HasBaseline(part.problem())) NormalizeScale(part.problem(), &own);
-    part.Replace(own, &estimate);
-    for (const int64_t i : split[n]) {
-      point_part[problem.observations[i].point] = static_cast<int32_t>(n);
-    }
-  }
-  JoinParts(problem, part_of, point_part, kCapOfPoints * level, context,
-            &estimate);
-  std::vector<int32_t> across;
-  for (int32_t k = 0; k < problem.num_points; ++k) {
-    for (const int64_t i : problem.OfPoint(k)) {
-      if (part_of[problem.FrameOf(i)] == point_part[k]) continue;
-      across.push_back(k);
-      break;
-    }
-  }
-  PlacePointsRobustly(problem, across, norm, kCapOfPoints * level, context,
-                      &estimate);
-  if (!HasBaseline(problem)) NormalizeScale(problem, &estimate);
-  return estimate;
-}
-
 Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
                           double level, const Context& context) {
   PartOptions options;
@@ -316,7 +259,16 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
   if (*std::max_element(part_of.begin(), part_of.end()) == 0) {
     return StartOfPart(problem, norm, level, context);
   }
-  return StartOfParts(problem, part_of, norm, level, context);
+  Estimate estimate = AllAtZero(problem);
+  PlaceParts(
+      problem, part_of, norm, level, context,
+      [&](const KnownRotationProblem& part, const Context& within,
+          Estimate* own) {
+        *own = StartOfPart(part, norm, level, within);
+        MinimizeRobustly(part, within, own);
+      },
+      &estimate);
+  return estimate;
 }
 
 }  // namespace
@@ -326,8 +278,9 @@ Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
   Estimate estimate = AllAtZero(problem);
   for (std::vector<int64_t>& component : SplitIntoComponents(problem)) {
     const ProblemSubset part(problem, std::move(component));
-    part.Replace(StartOfComponent(part.problem(), norm, level, context),
-                 &estimate);
+    Estimate own = StartOfComponent(part.problem(), norm, level, context);
+    MinimizeAndJoin(part.problem(), norm, level, context, &own);
+    part.Replace(own, &estimate);
   }
   return estimate;
 }

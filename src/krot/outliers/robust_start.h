@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -71,12 +72,35 @@ Eigen::Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i);
 //      matrix would fill, of a core of frames, then the others ring by ring;
 //   4. the other points go where most of their rays agree;
 //   5. several parts move to minima of a robust sum of squares
-//      (finish/least_squares.h) and are joined.
+//      (finish/least_squares.h) and are joined;
+//   6. all move to such a minimum. Tracks that disagree hold nothing there:
+//   what
+//      those that agree do not tie is joined anew, and frames that hardly agree
+//      are placed anew, while that makes more observations agree.
 //
 // Errors above `level`, pixels, count as wrong there. Depths are positive but
-// for those of outliers, and their median is one where the scale is free.
+// for those of outliers.
 Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
                          double level, const Context& context);
+
+// Places a part of a problem, of which `*estimate` is.
+using PlacePart =
+    std::function<void(const KnownRotationProblem& part, const Context& context,
+                       Estimate* estimate)>;
+
+// Places parts (`part_of` each frame) one by one, or leaves each as it is, if
+// `place` is empty; then joins them, each with its own place and scale, and
+// places the points anew that frames of several parts see.
+void PlaceParts(const KnownRotationProblem& problem,
+                const std::vector<int32_t>& part_of, Norm norm, double level,
+                const Context& context, const PlacePart& place,
+                Estimate* estimate);
+
+// MinimizeRobustly for a connected problem. As tracks that cost more than a
+// bound hold nothing, frames may have run away from the others there, alone or
+// in parts: they are placed anew, as long as more observations agree then.
+void MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
+                     double level, const Context& context, Estimate* estimate);
 
 // The median error of an estimate, pixels; that of a point behind its camera is
 // infinite. 0 without observations. O(observations).

@@ -79,11 +79,13 @@ class Joiner {
       std::vector<GroupPair> pairs = Groups(problem_, group_of_).Pairs();
       if (pairs.empty()) return links;
       SortStrongestFirst(&pairs);
-      std::vector<char> is_done(problem_.num_frames, 0);
+      std::vector<char> has_stronger(problem_.num_frames, 0);
       for (const GroupPair& pair : pairs) {
         if (context_.IsCancelled()) return links;
-        if (is_done[pair.a] || is_done[pair.b]) continue;
-        is_done[pair.a] = is_done[pair.b] = 1;
+        const bool is_strongest =
+            !has_stronger[pair.a] && !has_stronger[pair.b];
+        has_stronger[pair.a] = has_stronger[pair.b] = 1;
+        if (!is_strongest) continue;
         context_.Stage(may_move_ ? "joining parts"
                                  : "measuring how well few tracks hold parts",
                        static_cast<int64_t>(links.size()) + 1);
@@ -292,7 +294,8 @@ std::vector<WeakLink> JoinParts(const KnownRotationProblem& problem,
 }
 
 std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
-                                    const Estimate& estimate, double cap,
+                                    const Estimate& estimate,
+                                    const std::vector<char>& kept, double cap,
                                     const Context& context) {
   std::vector<WeakLink> links;
   for (std::vector<int64_t>& component : SplitIntoComponents(problem)) {
@@ -301,7 +304,11 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
     SortUnique(&frames);
     const ProblemSubset subset(problem, std::move(component));
     const KnownRotationProblem& own = subset.problem();
-    std::vector<int32_t> parts = FindParts(own, {});
+    std::vector<char> own_kept(own.observations.size());
+    for (size_t i = 0; i < own_kept.size(); ++i) {
+      own_kept[i] = kept[subset.InWhole(static_cast<int64_t>(i))];
+    }
+    std::vector<int32_t> parts = FindParts(own, own_kept, {});
     if (*std::max_element(parts.begin(), parts.end()) == 0) continue;
     Estimate placed = subset.Restrict(estimate);
     PlacePointsRobustly(own, AllPoints(own), Norm::L2(), cap, context, &placed);

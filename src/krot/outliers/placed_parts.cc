@@ -1,0 +1,146 @@
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "krot/finish/least_squares.h"
+#include "krot/outliers/parts.h"
+#include "krot/outliers/robust_start.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
+#include "krot/problem/subset.h"
+
+namespace krot::internal {
+namespace {
+
+// For every part its observations of the points that it observes at least
+// twice.
+std::vector<std::vector<int64_t>> SplitIntoParts(
+    const KnownRotationProblem& problem, const std::vector<int32_t>& part_of) {
+  std::vector<std::vector<int64_t>> split(
+      *std::max_element(part_of.begin(), part_of.end()) + 1);
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    for (const int64_t i : problem.OfPoint(k)) {
+      const int32_t own = part_of[problem.FrameOf(i)];
+      int num_own = 0;
+      for (const int64_t j : problem.OfPoint(k)) {
+        num_own += part_of[problem.FrameOf(j)] == own;
+      }
+      if (num_own >= 2) split[own].push_back(i);
+    }
+  }
+  return split;
+}
+
+}  // namespace
+
+void PlaceParts(const KnownRotationProblem& problem,
+                const std::vector<int32_t>& part_of, Norm norm, double level,
+                const Context& context, const PlacePart& place,
+                Estimate* estimate) {
+  const std::vector<std::vector<int64_t>> split =
+      SplitIntoParts(problem, part_of);
+  std::vector<int32_t> point_part(problem.num_points, -1);
+  for (size_t n = 0; n < split.size(); ++n) {
+    if (split[n].empty()) continue;
+    const ProblemSubset part(problem, split[n]);
+    Estimate own = part.Restrict(*estimate);
+    if (place) {
+      place(part.problem(),
+            context.Within("part " + std::to_string(n + 1) + " of " +
+                           std::to_string(split.size())),
+            &own);
+    }
+    if (!HasBaseline(part.problem())) NormalizeScale(part.problem(), &own);
+    part.Replace(own, estimate);
+    for (const int64_t i : split[n]) {
+      point_part[problem.observations[i].point] = static_cast<int32_t>(n);
+    }
+  }
+  JoinParts(problem, part_of, point_part, kCapOfPoints * level, context,
+            estimate);
+  std::vector<int32_t> across;
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    for (const int64_t i : problem.OfPoint(k)) {
+      if (part_of[problem.FrameOf(i)] == point_part[k]) continue;
+      across.push_back(k);
+      break;
+    }
+  }
+  PlacePointsRobustly(problem, across, norm, kCapOfPoints * level, context,
+                      estimate);
+  if (!HasBaseline(problem)) NormalizeScale(problem, estimate);
+}
+
+namespace {
+
+// Which observations an estimate explains.
+struct Agreement {
+  Agreement(const KnownRotationProblem& problem, const Estimate& estimate,
+            Norm norm, double cap);
+
+  std::vector<char> agrees;  // per observation
+  int64_t num_agreeing = 0;
+  // Frames that disagree with most of what they see of the others' points.
+  std::vector<int32_t> loose_frames;
+  std::vector<char> is_placed;  // points that two other frames agree on
+};
+
+Agreement::Agreement(const KnownRotationProblem& problem,
+                     const Estimate& estimate, Norm norm, double cap)
+    : agrees(problem.observations.size()), is_placed(problem.num_points, 0) {
+  const auto count = static_cast<int64_t>(agrees.size());
+  std::vector<int64_t> num_of_frame(problem.num_frames, 0);
+  for (int64_t i = 0; i < count; ++i) {
+    const Observation& o = problem.observations[i];
+    agrees[i] = ResidualOf(ViewPoint(problem, o, estimate), norm) <= cap;
+    num_agreeing += agrees[i];
+    num_of_frame[problem.FrameOf(i)] += agrees[i];
+  }
+  // Half of the share that agrees everywhere.
+  std::vector<char> is_loose(problem.num_frames);
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    const int64_t num_seen =
+        problem.frame_begin[f + 1] - problem.frame_begin[f];
+    is_loose[f] = 2 * num_of_frame[f] * count < num_seen * num_agreeing;
+    if (is_loose[f]) loose_frames.push_back(f);
+  }
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    int num = 0;
+    for (const int64_t i : problem.OfPoint(k)) {
+      num += agrees[i] && !is_loose[problem.FrameOf(i)];
+    }
+    is_placed[k] = num >= 2;
+  }
+}
+
+}  // namespace
+
+void MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
+                     double level, const Context& context, Estimate* estimate) {
+  MinimizeRobustly(problem, context, estimate);
+  for (int n = 0; n < 5 && !context.IsCancelled(); ++n) {
+    const double cap =
+        kCapOfPoints * std::max(level, MedianError(problem, *estimate, norm));
+    const Agreement now(problem, *estimate, norm, cap);
+    const std::vector<int32_t> part_of = FindParts(problem, now.agrees, {});
+    const bool is_whole =
+        *std::max_element(part_of.begin(), part_of.end()) == 0;
+    if (is_whole && now.loose_frames.empty()) return;
+    Estimate moved = *estimate;
+    if (is_whole) {
+      PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
+                          kCapOfPoints * level, context, &moved);
+    } else {
+      PlaceParts(problem, part_of, norm, level, context, {}, &moved);
+    }
+    MinimizeRobustly(problem, context, &moved);
+    const int64_t gain =
+        Agreement(problem, moved, norm, cap).num_agreeing - now.num_agreeing;
+    if (gain > 0) *estimate = std::move(moved);
+    if (1000 * gain <= now.num_agreeing) return;
+  }
+}
+
+}  // namespace krot::internal
