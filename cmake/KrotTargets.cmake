@@ -30,6 +30,10 @@ endfunction()
 function(krot_warnings target)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")  # GoogleTest's macros
+    target_compile_options(${target}
+      PRIVATE -Wno-gnu-zero-variadic-macro-arguments)
+  endif()
   if(EMSCRIPTEN)  # Indices have 64 bits, memory 32; the page is one long text.
     target_compile_options(${target}
       PRIVATE -Wno-shorten-64-to-32 -Wno-overlength-strings)

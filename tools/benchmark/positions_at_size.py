@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Positions from nothing by the number of images, outliers and rotations.
 
-    positions_at_size.py KROT BENCHMARK [IMAGES ...]
+    positions_at_size.py KROT BENCHMARK [orbit|street] [IMAGES ...]
 
-KROT and BENCHMARK are the built programs. Makes rings of so many images (200,
-1000 and 5000 if none are given; 400 observations each, tracks of eight, noise
-of 1 px) with 0, 10 and 30 % of the observations wrong and rotations off by 0,
+KROT and BENCHMARK are the built programs. Makes rings (or streets) of so many
+images (200, 1000 and 5000 if none are given; 400 observations each, tracks of
+eight, noise of 1 px) with 0, 10 and 30 % of the observations wrong and rotations off by 0,
 0.3, 1 and 2 degrees (by 0.3 beyond 1000 images), and no positions that fit,
 lets `krot solver --Solver.init feasible` find the positions and `krot
 bundle_adjuster` adjust them with a Cauchy loss; up to 1000 images also the
@@ -49,14 +49,14 @@ def cell(value):
     return "" if value is None else f"{value:.3f}"
 
 
-def measure(krot, benchmark, folder, images, share, turned):
+def measure(krot, benchmark, folder, images, share, turned, layout="orbit"):
     """One row of the table."""
     scene, truth, out, rival, adjusted, report, compared = (
         os.path.join(folder, name)
         for name in ("scene", "truth", "out", "rival", "adjusted",
                      "report.json", "compared.json"))
     code, _ = run(krot, "model_synthesizer", "--output_path", scene,
-                  "--ground_truth_path", truth, "--Scene.layout", "orbit",
+                  "--ground_truth_path", truth, "--Scene.layout", layout,
                   "--Scene.num_frames", str(images),
                   "--Scene.num_points", str(50 * images),
                   "--Scene.track_length", "8",
@@ -100,12 +100,15 @@ def main():
     print("| images | wrong | degrees | processor s | MB | code | centres |"
           " adjusted | s | rival: s | centres | adjusted | s |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
-    for images in [int(n) for n in sys.argv[3:]] or [200, 1000, 5000]:
+    layout, sizes = "orbit", sys.argv[3:]
+    if sizes and not sizes[0].isdigit():
+        layout, *sizes = sizes
+    for images in [int(n) for n in sizes] or [200, 1000, 5000]:
         for share in (0, 0.1, 0.3):
             for turned in (0, 0.3, 1, 2) if images <= 1000 else (0.3,):
                 with tempfile.TemporaryDirectory() as folder:
                     print(measure(*sys.argv[1:3], folder, images, share,
-                                  turned), flush=True)
+                                  turned, layout), flush=True)
 
 
 if __name__ == "__main__":

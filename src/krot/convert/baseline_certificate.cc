@@ -19,7 +19,6 @@
 namespace krot::internal {
 namespace {
 
-using Json = CertificateFileJson;
 using Eigen::Vector3d;
 
 // An interval for each coordinate of a vector.
@@ -203,7 +202,7 @@ BaselineCertificate DescribeBaselines(const Model& model,
 }
 
 std::string BaselineJson(const BaselineCertificate& certificate) {
-  Json pairs = Json::array();
+  CertificateFileJson pairs = CertificateFileJson::array();
   for (const BaselineCertificate::Pair& pair : certificate.pairs) {
     pairs.push_back(
         {{"image_id1", pair.image_id1},
@@ -215,7 +214,7 @@ std::string BaselineJson(const BaselineCertificate& certificate) {
           {pair.baseline.x(), pair.baseline.y(), pair.baseline.z()}},
          {"cells", pair.cells}});
   }
-  Json json = {{"version", certificate.version},
+  CertificateFileJson json = {{"version", certificate.version},
                {"tolerance_px", certificate.tolerance_px}};
   json["baselines"] = std::move(pairs);
   return json.dump(1) + "\n";

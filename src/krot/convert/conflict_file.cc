@@ -16,7 +16,6 @@
 #include "krot/problem/subset.h"
 
 namespace krot::internal {
-using Json = CertificateFileJson;
 
 ConflictFile DescribeConflicts(
     const Model& model, const BuiltProblem& built, Norm norm, double max_error,
@@ -43,7 +42,7 @@ ConflictFile DescribeConflicts(
 }
 
 std::string ConflictJson(const ConflictFile& file) {
-  Json conflicts = Json::array();
+  CertificateFileJson conflicts = CertificateFileJson::array();
   for (const ConflictFile::Conflict& conflict : file.conflicts) {
     conflicts.push_back({{"lower_bound", conflict.lower_bound},
                          {"rows_bound", conflict.rows_bound},
@@ -53,7 +52,7 @@ std::string ConflictJson(const ConflictFile& file) {
       conflicts.back()["max_errors"] = conflict.max_errors;
     }
   }
-  Json json = {{"version", file.version},
+  CertificateFileJson json = {{"version", file.version},
                {"norm", NormJson(file.norm)},
                {"max_error", file.max_error},
                {"model_sha256", file.model_sha256}};
