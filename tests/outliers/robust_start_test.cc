@@ -109,8 +109,8 @@ TEST(FindRobustStart, KeepsTheBaselinesOfARig) {
 TEST(FindRobustStart, PlacesManyCamerasThatSeeEachOthersPoints) {
   SceneOptions options = Scene(0.1, 0);
   options.layout = SceneLayout::kOrbit;
-  options.num_frames = 620;
-  options.num_points = 9000;
+  options.num_frames = 320;
+  options.num_points = 4600;
   options.track_length = 8;
   const SyntheticScene scene = SynthesizeScene(options);
   EXPECT_LT(CentreError(scene.ground_truth, AtRobustStart(Wiped(scene.model))),

@@ -21,8 +21,9 @@
 namespace krot::internal {
 namespace {
 
-// The size of a core. The dense factor of so many costs next to nothing.
-constexpr int32_t kCoreFrames = 500;
+// The size of a core, where the whole has more than twice as many. The dense
+// factor of so many costs next to nothing.
+constexpr int32_t kCoreFrames = 150;
 
 // The observations of some of the longest tracks, ascending: a track is taken
 // if it sees a frame that has too little redundancy so far.
@@ -239,7 +240,7 @@ Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
   const std::vector<int64_t> tracks = ConnectedTracks(problem);
   const ProblemSubset part(problem, tracks);
   const bool is_full =
-      problem.num_frames > kCoreFrames && !HasFixed(problem) &&
+      problem.num_frames > 2 * kCoreFrames && !HasFixed(problem) &&
       ReducedCameraSystem(AnchoredStructure(part.problem())).kind() !=
           ReducedCameraSystem::Kind::kSparse;
   Estimate estimate =
