@@ -30,13 +30,12 @@ endfunction()
 function(krot_warnings target)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
-  if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")  # GoogleTest's macros
-    target_compile_options(${target}
-      PRIVATE -Wno-gnu-zero-variadic-macro-arguments)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")  # pages; GoogleTest's macros
+    target_compile_options(${target} PRIVATE
+      -Wno-overlength-strings -Wno-gnu-zero-variadic-macro-arguments)
   endif()
-  if(EMSCRIPTEN)  # Indices have 64 bits, memory 32; the page is one long text.
-    target_compile_options(${target}
-      PRIVATE -Wno-shorten-64-to-32 -Wno-overlength-strings)
+  if(EMSCRIPTEN)  # Indices have 64 bits, memory 32.
+    target_compile_options(${target} PRIVATE -Wno-shorten-64-to-32)
   endif()
   if(MINGW)  # A unit has more sections than the older format can number.
     target_compile_options(${target}

@@ -62,7 +62,7 @@ TEST(HugePages, AlignmentIsAsAskedFor) {
 }
 
 TEST(HugePages, WhatCannotBeServedIsToldAsBefore) {
-  const auto too_large =
+  volatile const auto too_large =
       static_cast<std::size_t>(std::numeric_limits<std::ptrdiff_t>::max()) -
       kMebibyte;
   EXPECT_THROW(static_cast<void>(std::vector<char>(too_large)), std::bad_alloc);
