@@ -14,6 +14,7 @@
 #include "krot/model/rigs.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/outliers/parts.h"
+#include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/weakly_tied.h"
 
@@ -281,12 +282,38 @@ TEST(FindWeakLinks, SaysThatTracksLeftOutHoldNothing) {
   for (int32_t f = 12; f < 24; ++f) torn.translations[f] *= 0.1;
   const std::vector<char> all(kept.size(), 1);
   EXPECT_TRUE(FindWeakLinks(problem, torn, all, 8, {}).empty());
-  const std::vector<WeakLink> links =
-      FindWeakLinks(problem, torn, kept, 8, {});
+  const std::vector<WeakLink> links = FindWeakLinks(problem, torn, kept, 8, {});
   ASSERT_EQ(links.size(), 1u);
   EXPECT_FALSE(links[0].IsHeld());
   EXPECT_EQ(links[0].frames.size(), 12u);
   EXPECT_GT(links[0].scale_factor, 5);
+}
+
+// Tracks of three, of which a fifth has no wrong observation.
+TEST(FindWeakLinks, AreHeldWhereAsManyTracksAreWrongElsewhere) {
+  int num_links = 0;
+  for (const uint64_t seed : {1u, 2u, 3u}) {
+    SceneOptions options = Scene(0.4, 0);
+    options.layout = SceneLayout::kStreet;
+    options.num_frames = 30;
+    options.num_points = 1800;
+    options.track_length = 3;
+    options.random_seed = seed;
+    const BuiltProblem built = BuildProblem(SynthesizeScene(options).model, {});
+    const KnownRotationProblem& problem = built.problem;
+    std::vector<char> kept;
+    for (const Observation& o : problem.observations) {
+      kept.push_back(
+          ResidualOf(ViewPoint(problem, o, built.start), Norm::L2()) < 8);
+    }
+    for (const WeakLink& link :
+         FindWeakLinks(problem, built.start, kept, 8, {})) {
+      num_links += 2 * link.num_agreeing < link.num_telling;
+      EXPECT_TRUE(link.IsHeld())
+          << link.num_agreeing << " of " << link.num_telling;
+    }
+  }
+  EXPECT_GT(num_links, 0);
 }
 
 TEST(FilterOutliers, SaysHowWellFewTracksHoldTheScale) {

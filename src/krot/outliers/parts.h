@@ -218,6 +218,8 @@ struct WeakLink {
   // among them that agree with the best place and scale.
   int64_t num_telling = 0;
   int64_t num_agreeing = 0;
+  // Of the tracks within groups, those with which all their observations agree.
+  double usual_share = 1;
   // The group could be larger or smaller by about this factor, and the tracks
   // would fit as well; infinite if any scale fits. >= 1.
   double scale_factor = 1;
@@ -227,10 +229,13 @@ struct WeakLink {
   double turn_deg = 0;
   int64_t num_agreeing_turned = 0;
 
-  // Whether scale and place can be relied on: the scale is held to a tenth, and
-  // more tracks agree than disagree.
+  // Whether scale and place can be relied on: the scale is held to a tenth, no
+  // turn was found, and at least half as large a share of the tracks agrees as
+  // elsewhere.
   bool IsHeld() const {
-    return scale_factor <= 1.1 && 2 * num_agreeing > num_telling;
+    return scale_factor <= 1.1 && turn_deg == 0 &&
+           2 * static_cast<double>(num_agreeing) >
+               usual_share * static_cast<double>(num_telling);
   }
 };
 

@@ -74,6 +74,7 @@ class Joiner {
   std::vector<WeakLink> Run() {
     sigma_ = std::max(NoiseOf(problem_, estimate_, group_of_, point_group_),
                       cap_ / kAgreeing);
+    usual_share_ = UsualShare();
     std::vector<WeakLink> links;
     for (;;) {
       std::vector<GroupPair> pairs = Groups(problem_, group_of_).Pairs();
@@ -160,6 +161,28 @@ class Joiner {
     return tracks;
   }
 
+  // WeakLink::usual_share; 1 where there are too few to tell.
+  double UsualShare() const {
+    int64_t num_within = 0, num_agreeing = 0;
+    for (int32_t k = 0; k < problem_.num_points; ++k) {
+      const int32_t group =
+          group_of_[problem_.FrameOf(problem_.point_begin[k])];
+      bool is_within = true, agrees = true;
+      for (const int64_t i : problem_.OfPoint(k)) {
+        is_within = is_within && group_of_[problem_.FrameOf(i)] == group;
+        agrees =
+            agrees &&
+            ResidualOf(ViewPoint(problem_, problem_.observations[i], estimate_),
+                       Norm::L2()) < kAgreeing * sigma_;
+      }
+      num_within += is_within;
+      num_agreeing += is_within && agrees;
+    }
+    return num_within < kStrongTracks ? 1
+                                      : static_cast<double>(num_agreeing) /
+                                            static_cast<double>(num_within);
+  }
+
   bool HasBaselineIn(int32_t group) const {
     return std::any_of(problem_.views.begin(), problem_.views.end(),
                        [&](const View& view) {
@@ -175,6 +198,7 @@ class Joiner {
     WeakLink link;
     const std::vector<SharedTrack> all = TracksOf(pair, &link.num_tracks);
     link.num_telling = static_cast<int64_t>(all.size());
+    link.usual_share = usual_share_;
     std::vector<SharedTrack> some;
     const size_t stride = std::max<size_t>(1, all.size() / 200);
     for (size_t n = 0; n < all.size(); n += stride) some.push_back(all[n]);
@@ -279,6 +303,7 @@ class Joiner {
   std::vector<int32_t> point_group_;  // per point; -1: none
   Estimate& estimate_;
   double sigma_ = 0;  // pixels
+  double usual_share_ = 1;
 };
 
 }  // namespace
