@@ -124,7 +124,7 @@ TEST(SceneNoise, HoweverStrongLeavesEveryDepthPositive) {
       options.rig_baseline = 0.2;
       options.start_translation_noise = 1;
       options.start_point_noise = 1;
-      options.rotation_noise_deg = 2;
+      options.rotation_noise_deg = 3;
       const SyntheticScene scene = SynthesizeScene(options);
       EXPECT_GT(MinDepth(scene.model), 0);
     }

@@ -42,7 +42,7 @@ TEST(SceneOptions, OutOfRangeAreNamedWithTheirValue) {
       {"start_translation_noise = -1, ",
        [](auto* o) { o->start_translation_noise = -1; }},
       {"start_point_noise = 3, ", [](auto* o) { o->start_point_noise = 3; }},
-      {"rotation_noise_deg = 3, ", [](auto* o) { o->rotation_noise_deg = 3; }},
+      {"rotation_noise_deg = 4, ", [](auto* o) { o->rotation_noise_deg = 4; }},
   };
   for (const BadOption& bad : bad_options) {
     SceneOptions options;

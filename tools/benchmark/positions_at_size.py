@@ -6,7 +6,7 @@
 KROT and BENCHMARK are the built programs. Makes rings (or streets) of so many
 images (200, 1000 and 5000 if none are given; 400 observations each, tracks of
 eight, noise of 1 px) with 0, 10 and 30 % of the observations wrong and rotations off by 0,
-0.3, 1 and 2 degrees (by 0.3 beyond 1000 images), and no positions that fit,
+0.3, 1 and 3 degrees (by 0.3 beyond 1000 images), and no positions that fit,
 lets `krot solver --Solver.init feasible` find the positions and `krot
 bundle_adjuster` adjust them with a Cauchy loss; up to 1000 images also the
 rival of bearings (`krot_benchmark positioning`). Prints user and system CPU
@@ -105,7 +105,7 @@ def main():
         layout, *sizes = sizes
     for images in [int(n) for n in sizes] or [200, 1000, 5000]:
         for share in (0, 0.1, 0.3):
-            for turned in (0, 0.3, 1, 2) if images <= 1000 else (0.3,):
+            for turned in (0, 0.3, 1, 3) if images <= 1000 else (0.3,):
                 with tempfile.TemporaryDirectory() as folder:
                     print(measure(*sys.argv[1:3], folder, images, share,
                                   turned, layout), flush=True)

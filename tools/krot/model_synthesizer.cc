@@ -89,7 +89,7 @@ void AddImperfections(SceneOptions* scene, OptionParser* parser) {
                   "Standard deviation of the points in the model to solve, "
                   "per axis");
   parser->AddReal("Scene.rotation_noise_deg", &scene->rotation_noise_deg,
-                  Between(0.0, 2.0, "degrees"),
+                  Between(0.0, 3.0, "degrees"),
                   "Standard deviation of the rotations in the model to solve");
 }
 

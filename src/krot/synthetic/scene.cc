@@ -54,7 +54,7 @@ void Check(const SceneOptions& options) {
   CheckRange("start_translation_noise", options.start_translation_noise, 0.0,
              1.0);
   CheckRange("start_point_noise", options.start_point_noise, 0.0, 1.0);
-  CheckRange("rotation_noise_deg", options.rotation_noise_deg, 0.0, 2.0);
+  CheckRange("rotation_noise_deg", options.rotation_noise_deg, 0.0, 3.0);
 }
 
 namespace {

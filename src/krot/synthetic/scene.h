@@ -56,7 +56,7 @@ struct SceneOptions {
   double start_translation_noise = 0;
   double start_point_noise = 0;
   // Every frame is rotated about a random axis by an angle of this sigma, cut
-  // off at 3 sigma; in [0, 2]. Known rotations keep this error.
+  // off at 3 sigma; in [0, 3]. Known rotations keep this error.
   double rotation_noise_deg = 0;
 
   uint64_t random_seed = 0;
