@@ -286,7 +286,7 @@ Place PlaceSearch::Improve(const Place& place) const {
   }
   Place moved = place;
   moved.shift += InverseOf(S) * rhs;
-  moved.cost = Cost(moved);
+  moved.cost = Cost(moved, place.cost);
   return moved;
 }
 
@@ -312,7 +312,7 @@ Place PlaceSearch::BestPlace(double scale) const {
       place.scale = scale;
       place.shift = InverseOf(of_shift[i].H + of_shift[j].H) *
                     (of_shift[i].g + of_shift[j].g);
-      place.cost = Cost(place);
+      place.cost = Cost(place, best.cost);
       if (place.cost < best.cost) best = place;
     }
   }
@@ -355,7 +355,7 @@ std::optional<Place> PlaceSearch::ProposeTurned() const {
         if (!(place.scale > 0) || !std::isfinite(place.scale)) continue;
         place.rotation = fit.topLeftCorner<3, 3>() / place.scale;
         place.shift = fit.topRightCorner<3, 1>();
-        place.cost = Cost(place);
+        place.cost = Cost(place, best.cost);
         if (place.cost < best.cost) best = place;
       }
     }
@@ -378,7 +378,7 @@ std::optional<Place> PlaceSearch::Propose() const {
     place.shift = (tracks[i]->a.x + tracks[j]->a.x -
                    place.scale * (tracks[i]->b.x + tracks[j]->b.x)) /
                   2;
-    place.cost = Cost(place);
+    place.cost = Cost(place, best.cost);
     if (place.cost < best.cost) best = place;
   });
   if (!std::isfinite(best.cost)) return std::nullopt;

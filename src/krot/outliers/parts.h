@@ -160,10 +160,13 @@ class PlaceSearch {
   std::optional<Place> Propose() const;
   // The same with a rotation, which three tracks propose; for few tracks, too.
   std::optional<Place> ProposeTurned() const;
-  double Cost(const Place& place) const {
+  // Infinite if it is `limit` or more.
+  double Cost(const Place& place,
+              double limit = std::numeric_limits<double>::infinity()) const {
     double sum = 0;
     for (const SharedTrack& track : tracks_) {
       sum += std::min(BestPoint(track, place).second, kCutOff * variance_);
+      if (sum >= limit) return std::numeric_limits<double>::infinity();
     }
     return sum;
   }
@@ -229,13 +232,14 @@ struct WeakLink {
   double turn_deg = 0;
   int64_t num_agreeing_turned = 0;
 
-  // Whether scale and place can be relied on: the scale is held to a tenth, no
-  // turn was found, and at least half as large a share of the tracks agrees as
-  // elsewhere.
+  // Whether scale and place can be relied on: the scale is held to a tenth, and
+  // more tracks agree than disagree; or no turn was found, and as large a share
+  // agrees as elsewhere.
   bool IsHeld() const {
-    return scale_factor <= 1.1 && turn_deg == 0 &&
-           2 * static_cast<double>(num_agreeing) >
-               usual_share * static_cast<double>(num_telling);
+    const double share = static_cast<double>(num_agreeing) /
+                         static_cast<double>(std::max<int64_t>(1, num_telling));
+    return scale_factor <= 1.1 &&
+           (share > 0.5 || (turn_deg == 0 && share > usual_share));
   }
 };
 

@@ -120,26 +120,34 @@ Agreement::Agreement(const KnownRotationProblem& problem,
 void MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
                      double level, const Context& context, Estimate* estimate) {
   MinimizeRobustly(problem, context, estimate);
-  for (int n = 0; n < 5 && !context.IsCancelled(); ++n) {
+  for (int n = 0; n < 8 && !context.IsCancelled(); ++n) {
     const double cap =
         kCapOfPoints * std::max(level, MedianError(problem, *estimate, norm));
     const Agreement now(problem, *estimate, norm, cap);
+    // Whether clearly more agree after this; it is kept if any more do.
+    const auto helps = [&](const auto& move) {
+      Estimate moved = *estimate;
+      move(&moved);
+      MinimizeRobustly(problem, context, &moved);
+      const int64_t gain =
+          Agreement(problem, moved, norm, cap).num_agreeing - now.num_agreeing;
+      if (gain > 0) *estimate = std::move(moved);
+      return 1000 * gain > now.num_agreeing;
+    };
     const std::vector<int32_t> part_of = FindParts(problem, now.agrees, {});
     const bool is_whole =
         *std::max_element(part_of.begin(), part_of.end()) == 0;
-    if (is_whole && now.loose_frames.empty()) return;
-    Estimate moved = *estimate;
-    if (is_whole) {
-      PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
-                          kCapOfPoints * level, context, &moved);
-    } else {
-      PlaceParts(problem, part_of, norm, level, context, {}, &moved);
+    if (!is_whole && helps([&](Estimate* moved) {
+          PlaceParts(problem, part_of, norm, level, context, {}, moved);
+        })) {
+      continue;
     }
-    MinimizeRobustly(problem, context, &moved);
-    const int64_t gain =
-        Agreement(problem, moved, norm, cap).num_agreeing - now.num_agreeing;
-    if (gain > 0) *estimate = std::move(moved);
-    if (1000 * gain <= now.num_agreeing) return;
+    if (now.loose_frames.empty() || !helps([&](Estimate* moved) {
+          PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
+                              kCapOfPoints * level, context, moved);
+        })) {
+      return;
+    }
   }
 }
 
