@@ -98,7 +98,7 @@ Agreement::Agreement(const KnownRotationProblem& problem,
     num_agreeing += agrees[i];
     num_of_frame[problem.FrameOf(i)] += agrees[i];
   }
-  // Half of the share that agrees everywhere.
+  // Loose: less than half of the share that agrees everywhere.
   std::vector<char> is_loose(problem.num_frames);
   for (int32_t f = 0; f < problem.num_frames; ++f) {
     const int64_t num_seen =

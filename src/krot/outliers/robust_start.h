@@ -73,9 +73,8 @@ Eigen::Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i);
 //   4. the other points go where most of their rays agree;
 //   5. several parts move to minima of a robust sum of squares
 //      (finish/least_squares.h) and are joined;
-//   6. all move to such a minimum. Tracks that disagree hold nothing there:
-//   what
-//      those that agree do not tie is joined anew, and frames that hardly agree
+//   6. all move to such a minimum. Tracks that disagree hold nothing there, so
+//      what the others do not tie is joined anew, and frames that hardly agree
 //      are placed anew, while that makes more observations agree.
 //
 // Errors above `level`, pixels, count as wrong there. Depths are positive but
@@ -83,7 +82,7 @@ Eigen::Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i);
 Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
                          double level, const Context& context);
 
-// Places a part of a problem, of which `*estimate` is.
+// Places a part of a problem; `*estimate` is the part's.
 using PlacePart =
     std::function<void(const KnownRotationProblem& part, const Context& context,
                        Estimate* estimate)>;
