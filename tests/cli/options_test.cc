@@ -106,7 +106,7 @@ TEST_F(Options, OfTheSynthesizerAreCheckedAgainstTheirRanges) {
       {"--Scene.duplicate_ratio", "2"},
       {"--Scene.start_translation_noise", "2"},
       {"--Scene.start_point_noise", "-1"},
-      {"--Scene.rotation_noise_deg", "3"},
+      {"--Scene.rotation_noise_deg", "4"},
       {"--output_type", "auto"},
   };
   for (const Words& option : wrong) {
