@@ -230,8 +230,8 @@ TEST(FindRobustStart, HoldsTheScaleOfPartsThatTenTracksJoinHalfOfThemWrong) {
   }
 }
 
-// 200 images along a path, three tenths of the observations wrong.
-SyntheticScene LongStreet() {
+// 200 images along a path.
+TEST(FindRobustStart, JoinsAgainWhatTracksThatDisagreeDidNotHold) {
   SceneOptions options = Scene(0.3, 0.3);
   options.layout = SceneLayout::kStreet;
   options.num_frames = 200;
@@ -239,11 +239,7 @@ SyntheticScene LongStreet() {
   options.track_length = 8;
   options.pixel_noise = 1;
   options.random_seed = 0;
-  return SynthesizeScene(options);
-}
-
-TEST(FindRobustStart, JoinsAgainWhatTracksThatDisagreeDidNotHold) {
-  const SyntheticScene scene = LongStreet();
+  const SyntheticScene scene = SynthesizeScene(options);
   EXPECT_LT(CentreError(scene.ground_truth, AtRobustStart(Wiped(scene.model))),
             0.01);
 }
@@ -289,17 +285,22 @@ TEST(FindWeakLinks, SaysThatTracksLeftOutHoldNothing) {
   EXPECT_GT(links[0].scale_factor, 5);
 }
 
-// Tracks of three, of which a fifth has no wrong observation.
+// 30 images along a path, tracks of three.
+SyntheticScene ShortTracks(double outlier_ratio, uint64_t seed) {
+  SceneOptions options = Scene(outlier_ratio, 0);
+  options.layout = SceneLayout::kStreet;
+  options.num_frames = 30;
+  options.num_points = 1800;
+  options.track_length = 3;
+  options.random_seed = seed;
+  return SynthesizeScene(options);
+}
+
+// A fifth of the tracks has no wrong observation.
 TEST(FindWeakLinks, AreHeldWhereAsManyTracksAreWrongElsewhere) {
   int num_links = 0;
   for (const uint64_t seed : {1u, 2u, 3u}) {
-    SceneOptions options = Scene(0.4, 0);
-    options.layout = SceneLayout::kStreet;
-    options.num_frames = 30;
-    options.num_points = 1800;
-    options.track_length = 3;
-    options.random_seed = seed;
-    const BuiltProblem built = BuildProblem(SynthesizeScene(options).model, {});
+    const BuiltProblem built = BuildProblem(ShortTracks(0.4, seed).model, {});
     const KnownRotationProblem& problem = built.problem;
     std::vector<char> kept;
     for (const Observation& o : problem.observations) {
@@ -383,14 +384,8 @@ TEST(FilterOutliers, SaysByWhichTurnThePartsTracksWouldAgree) {
 
 // A quarter of tracks of three is wrong.
 TEST(FindRobustStart, FindsThePositionsOfShortTracks) {
-  for (const int seed : {0, 1, 2, 3, 4}) {
-    SceneOptions options = Scene(0.25, 0);
-    options.layout = SceneLayout::kStreet;
-    options.num_frames = 30;
-    options.num_points = 1800;
-    options.track_length = 3;
-    options.random_seed = seed;
-    const SyntheticScene scene = SynthesizeScene(options);
+  for (const uint64_t seed : {0u, 1u, 2u}) {
+    const SyntheticScene scene = ShortTracks(0.25, seed);
     EXPECT_LT(
         CentreError(scene.ground_truth, AtRobustStart(Wiped(scene.model))),
         0.02)

@@ -5,13 +5,13 @@
 
 KROT and BENCHMARK are the built programs. Makes rings (or streets) of so many
 images (200, 1000 and 5000 if none are given; 400 observations each, tracks of
-eight, noise of 1 px) with 0, 10 and 30 % of the observations wrong and rotations off by 0,
-0.3, 1 and 3 degrees (by 0.3 beyond 1000 images), and no positions that fit,
-lets `krot solver --Solver.init feasible` find the positions and `krot
-bundle_adjuster` adjust them with a Cauchy loss; up to 1000 images also the
-rival of bearings (`krot_benchmark positioning`). Prints user and system CPU
-seconds, memory, and the RMS distance of the centres from the truth as a
-percentage of the radius. The Python standard library is enough.
+eight, noise of 1 px) with 0, 10 and 30 % of the observations wrong and
+rotations off by 0, 0.3, 1 and 3 degrees (by 0.3 beyond 1000 images), and no
+positions that fit, lets `krot solver --Solver.init feasible` find the positions
+and `krot bundle_adjuster` adjust them with a Cauchy loss; up to 1000 images
+also the rival of bearings (`krot_benchmark positioning`). Prints user and
+system CPU seconds, memory, and the RMS distance of the centres from the truth
+as a percentage of the radius. The Python standard library is enough.
 """
 
 import json

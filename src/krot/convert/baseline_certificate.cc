@@ -215,7 +215,7 @@ std::string BaselineJson(const BaselineCertificate& certificate) {
          {"cells", pair.cells}});
   }
   CertificateFileJson json = {{"version", certificate.version},
-               {"tolerance_px", certificate.tolerance_px}};
+                              {"tolerance_px", certificate.tolerance_px}};
   json["baselines"] = std::move(pairs);
   return json.dump(1) + "\n";
 }

@@ -53,9 +53,9 @@ std::string ConflictJson(const ConflictFile& file) {
     }
   }
   CertificateFileJson json = {{"version", file.version},
-               {"norm", NormJson(file.norm)},
-               {"max_error", file.max_error},
-               {"model_sha256", file.model_sha256}};
+                              {"norm", NormJson(file.norm)},
+                              {"max_error", file.max_error},
+                              {"model_sha256", file.model_sha256}};
   json["conflicts"] = std::move(conflicts);
   return json.dump(1) + "\n";
 }

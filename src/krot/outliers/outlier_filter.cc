@@ -86,8 +86,9 @@ class OutlierFilter : private Filtering {
     bound_.max_error = start.max_error;
     summary_.is_bound_beyond_reason =
         !options_.max_error && start.max_error > options_.solve.init_max_error;
-    if (start.nearly_fits && (KeepsAll(built) || context_.IsCancelled()))
+    if (start.nearly_fits && (KeepsAll(built) || context_.IsCancelled())) {
       return;
+    }
     const std::vector<uint64_t> elements = ElementsOf(model_, built);
     std::vector<Conflict> found;
     const std::optional<Removal> removal = RemoveFew(built, &found);

@@ -10,7 +10,6 @@
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/convert/reprojection.h"
-#include "krot/finish/least_squares.h"
 #include "krot/model/derived_models.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/removal.h"

@@ -74,7 +74,7 @@ class Joiner {
   std::vector<WeakLink> Run() {
     sigma_ = std::max(NoiseOf(problem_, estimate_, group_of_, point_group_),
                       cap_ / kAgreeing);
-    usual_share_ = UsualShare();
+    if (!may_move_) usual_share_ = UsualShare();
     std::vector<WeakLink> links;
     for (;;) {
       std::vector<GroupPair> pairs = Groups(problem_, group_of_).Pairs();
