@@ -3,7 +3,6 @@
 #include <pybind11/pybind11.h>
 
 #include "krot/analysis/model_input.h"
-#include "krot/model/known_distances.h"
 #include "krot/model/model_io.h"
 
 namespace krot::internal {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "krot/analysis/position_frame.h"
+#include "krot/analysis/model_input.h"
 #include "krot/database.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"

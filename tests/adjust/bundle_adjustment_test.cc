@@ -17,7 +17,7 @@
 #include "krot/compare.h"
 #include "krot/context.h"
 #include "krot/model.h"
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"

@@ -9,7 +9,7 @@
 
 #include "krot/adjust/precision_system.h"
 #include "krot/geometry.h"
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 #include "krot/model/rigs.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/synthetic/scene.h"

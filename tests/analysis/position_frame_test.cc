@@ -1,4 +1,4 @@
-#include "krot/analysis/position_frame.h"
+#include "krot/analysis/model_input.h"
 
 #include <algorithm>
 #include <cmath>

@@ -155,7 +155,7 @@ TEST(IncludeRule, TheCertificatesCheckerSeesNothingOfTheSolvers) {
   }
   EXPECT_EQ(included.count("krot/problem/known_rotation_problem.h"), 1u);
   std::set<std::string> of_baselines;
-  AddIncluded("krot/convert/baseline_certificate.h", &of_baselines);
+  AddIncluded("krot/convert/certificate_file.h", &of_baselines);
   AddIncluded("krot/convert/baseline_certificate.cc", &of_baselines);
   for (const std::string& file : of_baselines) {
     EXPECT_NE(file.rfind("krot/analysis/", 0), 0u)

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/synthetic/scene_steps.h"
+#include "krot/synthetic/scene.h"
 
 namespace krot::internal {
 namespace {

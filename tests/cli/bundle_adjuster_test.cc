@@ -8,7 +8,7 @@
 
 #include "krot/geometry.h"
 #include "krot/model.h"
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 #include "krot/model/rigs.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/colors.h"
+#include "krot/analysis/model_statistics.h"
 #include "krot/model.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/geometry.h"
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 #include "krot/model/rigs.h"
 #include "tests/cli/known_fixture.h"
 #include "tests/cli/scenes.h"

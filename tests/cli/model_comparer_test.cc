@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "krot/analysis/colors.h"
+#include "krot/analysis/model_statistics.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"

@@ -12,7 +12,6 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "krot/convert/model_digest.h"
 #include "krot/context.h"
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"

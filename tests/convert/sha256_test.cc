@@ -1,4 +1,4 @@
-#include "krot/convert/model_digest.h"
+#include "krot/convert/certificate_file.h"
 
 #include <array>
 #include <random>

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/synthetic/scene_steps.h"
+#include "krot/synthetic/scene.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"

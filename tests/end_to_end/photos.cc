@@ -8,7 +8,7 @@
 #include <string>
 
 #include "krot/camera/camera_model.h"
-#include "krot/synthetic/scene_steps.h"
+#include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
 namespace krot::internal {

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/model.h"
-#include "krot/synthetic/scene_steps.h"
+#include "krot/synthetic/scene.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"

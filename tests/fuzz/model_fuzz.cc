@@ -6,7 +6,7 @@
 
 #include "krot/context.h"
 #include "krot/convert/build_problem.h"
-#include "krot/convert/model_digest.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/model.h"
 #include "krot/model/formats.h"
 #include "krot/model/model_checks.h"

@@ -1,4 +1,4 @@
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 
 #include <algorithm>
 #include <bitset>
@@ -72,8 +72,7 @@ TEST(ReadDistances, RefusesWhatIsNoDistance) {
        std::vector<std::pair<std::string, std::string>>{
            {"", "found no line"},
            {pair + " 1\n", "METRES and TOLERANCE"},
-           {pair + " 0 1\n",
-            "found \"0\", expected METRES and TOLERANCE from"},
+           {pair + " 0 1\n", "found \"0\", expected METRES and TOLERANCE from"},
            {pair + " 1 -1\n", "found \"-1\""},
            {pair + " 1e13 1\n", "found \"1e+13\""},
            {pair + " nan 1\n", "finite numbers"},

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/convert/reprojection.h"
-#include "krot/outliers/packing.h"
+#include "krot/outliers/conflict.h"
 #include "tests/outliers/outlier_scenes.h"
 
 namespace krot::internal {

@@ -1,4 +1,3 @@
-#include "krot/outliers/packing.h"
 
 #include <algorithm>
 #include <set>

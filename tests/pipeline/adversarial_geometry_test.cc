@@ -10,7 +10,6 @@
 #include "krot/model/rigs.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
-#include "krot/synthetic/scene_steps.h"
 
 // Scenes in which something that solvers like to take for granted is missing:
 // parallax, a baseline, noise, more than one point in common. The truth itself

@@ -10,7 +10,6 @@
 #include <gtest/gtest.h>
 
 #include "krot/convert/certificate_file.h"
-#include "krot/convert/model_digest.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 

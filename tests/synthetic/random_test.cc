@@ -1,4 +1,4 @@
-#include "krot/synthetic/scene_steps.h"
+#include "krot/synthetic/scene.h"
 
 #include <gtest/gtest.h>
 

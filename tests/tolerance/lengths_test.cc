@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/model.h"
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
 #include "krot/tolerance/tolerance_analysis.h"
 

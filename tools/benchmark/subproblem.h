@@ -7,7 +7,7 @@
 
 #include "krot/minimax/residual_set.h"
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/synthetic/scene_steps.h"
+#include "krot/synthetic/scene.h"
 
 namespace krot::internal {
 

@@ -135,10 +135,7 @@ int Run(const ModelPaths& paths, const std::string& check_points_path,
   report.is_in_position_frame = survey.is_in_own_frame();
   report.distances = distances.Compare(result.model, report.summary);
 
-  BeginPhase(common.log, "writing " + paths.output_path);
-  const Timer write_timer;
-  WriteModel(result.model, paths.output_path, write_options);
-  report.run.seconds_write = write_timer.Seconds();
+  WriteOutput(result.model, paths, write_options, common.log, &report.run);
   RecordEnd(total_timer, num_threads, &report.run);
   const bool is_text =
       std::filesystem::path(paths.report_path).extension() == ".txt";
@@ -178,12 +175,8 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
                  "report compares them, in the survey's frame and unit");
   AddWriteOnInterrupt(&paths, &parser);
   options.AddTo(&parser);
-  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
-                   &common, &parser);
-  if (!parser.Parse(arguments)) {
-    PrintTable(common.log, parser.Help());
-    return kExitDone;
-  }
+  AddCommonOptions(&common, &parser);
+  if (!ParseOrPrintHelp(arguments, common, &parser)) return kExitDone;
   CheckPositionsPath(paths, parser);
   if (parser.IsGiven("BundleAdjustment.max_error") ||
       parser.IsGiven("BundleAdjustment.max_error_factor")) {

@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "krot/base/write_file.h"
-#include "krot/convert/baseline_certificate.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/report/reports.h"
 #include "krot/version.h"
@@ -37,8 +36,7 @@ void AddCheckerOptions(CheckerOptions* options, OptionParser* parser) {
   AddOnContradiction(&options->on_contradiction, parser);
   parser->AddInteger("num_worst", &options->num_worst, AtLeast(0),
                      "How many observations of the support to list");
-  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
-                   &options->common, parser);
+  AddCommonOptions(&options->common, parser);
 }
 
 Model ReadSubject(const CheckerOptions& options) {
@@ -112,10 +110,7 @@ int RunCertificateChecker(const std::vector<std::string>& arguments) {
                       "more matches, from a COLMAP model and the certificate's "
                       "file alone");
   AddCheckerOptions(&options, &parser);
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.common.log, parser.Help());
-    return kExitDone;
-  }
+  if (!ParseOrPrintHelp(arguments, options.common, &parser)) return kExitDone;
   CheckSidePath("report_path", options.report_path);
   const std::string json = ReadCertificateText(options.certificate_path);
   if (HoldsBaselines(json)) return CheckBaselines(options, json);

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "krot/convert/model_digest.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/model/model_io.h"
 #include "krot/pipeline/checkpoint_file.h"
 #include "krot/report/text_table.h"

@@ -16,9 +16,9 @@ void AddProjectPath(std::string* project_path, OptionParser* parser) {
                   "[Sections]; the command line wins");
 }
 
-void AddCommonOptions(const std::string& seed_description,
-                      CommonOptions* options, OptionParser* parser) {
-  parser->Add({"random_seed", seed_description, "an integer >= 0",
+void AddCommonOptions(CommonOptions* options, OptionParser* parser,
+                      const char* of_seed) {
+  parser->Add({"random_seed", of_seed, "an integer >= 0",
                std::to_string(options->random_seed), false,
                [options](const std::string& text) {
                  return ParseInteger(text, &options->random_seed);
@@ -34,6 +34,13 @@ void AddCommonOptions(const std::string& seed_description,
   parser->OnParsed([options, parser] {
     if (!options->log.path.empty()) BeginRunLog(options->log.path, *parser);
   });
+}
+
+bool ParseOrPrintHelp(const std::vector<std::string>& arguments,
+                      const CommonOptions& options, OptionParser* parser) {
+  if (parser->Parse(arguments)) return true;
+  PrintTable(options.log, parser->Help());
+  return false;
 }
 
 }  // namespace krot::internal

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
@@ -17,7 +18,13 @@ struct CommonOptions {
 
 void AddLogLevel(LogOptions* log, OptionParser* parser);
 void AddProjectPath(std::string* project_path, OptionParser* parser);
-void AddCommonOptions(const std::string& seed_description,
-                      CommonOptions* options, OptionParser* parser);
+void AddCommonOptions(
+    CommonOptions* options, OptionParser* parser,
+    const char* of_seed =
+        "Accepted everywhere; this command draws no random numbers");
+
+// Sets the values, or prints the help that is asked for and returns false.
+bool ParseOrPrintHelp(const std::vector<std::string>& arguments,
+                      const CommonOptions& options, OptionParser* parser);
 
 }  // namespace krot::internal

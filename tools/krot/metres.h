@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "krot/analysis/position_frame.h"
+#include "krot/analysis/model_input.h"
 #include "krot/model.h"
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 #include "krot/report/reports.h"
 #include "tools/krot/log.h"
 #include "tools/krot/model_files.h"

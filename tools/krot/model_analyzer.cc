@@ -1,7 +1,7 @@
 #include <string>
 #include <vector>
 
-#include "krot/analysis/colors.h"
+#include "krot/analysis/model_statistics.h"
 #include "krot/base/write_file.h"
 #include "krot/context.h"
 #include "krot/convert/certificate_file.h"
@@ -59,8 +59,7 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                   "The error from which on the copy's points are dark red");
   AddOverwrite(&options->overwrite, parser);
   AddOnContradiction(&options->on_contradiction, parser);
-  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
-                   &options->common, parser);
+  AddCommonOptions(&options->common, parser);
 }
 
 // The model's path, under whichever of its two names.
@@ -146,10 +145,7 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
                       "shows a COLMAP model's reprojection errors by image "
                       "and camera, its worst observations, tracks and depths");
   AddAnalyzerOptions(&options, &parser);
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.common.log, parser.Help());
-    return kExitDone;
-  }
+  if (!ParseOrPrintHelp(arguments, options.common, &parser)) return kExitDone;
   const std::string path = ModelPath(options, parser);
   CheckAnalyzerPaths(options, path, parser);
   const auto [model, contradictions, poses] = ReadToShow(path, options, parser);

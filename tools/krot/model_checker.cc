@@ -6,7 +6,7 @@
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"
 #include "krot/check.h"
-#include "krot/convert/baseline_certificate.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/database.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/report/reports.h"
@@ -56,8 +56,7 @@ void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
                      "to list");
   parser->AddThreads("num_threads", &command->context.num_threads,
                      "the result is the same, bit by bit");
-  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
-                   &command->common, parser);
+  AddCommonOptions(&command->common, parser);
 }
 
 // Checks what can be known before the model is read.
@@ -87,13 +86,8 @@ WriteModelOptions CheckPaths(const CheckerCommand& command,
     write_options.copy_project_from = paths.input_path;
     write_options.on_note = WarnOn(command.common.log);
   }
-  if (command.suspects_path.empty()) return write_options;
-  for (const std::string& other : {paths.input_path, paths.output_path}) {
-    if (!IsSamePath(command.suspects_path, other)) continue;
-    throw OptionError("--suspects_path = " + command.suspects_path +
-                      ", must be a folder of its own");
-  }
-  CheckWritable(command.suspects_path, write_options);
+  CheckOwnFolder("suspects_path", command.suspects_path,
+                 {paths.input_path, paths.output_path}, write_options);
   return write_options;
 }
 
@@ -192,10 +186,7 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
                          "nothing is left to write: every track contradicts "
                          "itself; no model was written");
     }
-    BeginPhase(log, "writing " + paths.output_path);
-    const Timer write_timer;
-    WriteModel(cured, paths.output_path, write_options);
-    report.run.seconds_write = write_timer.Seconds();
+    WriteOutput(cured, paths, write_options, log, &report.run);
   }
   if (!command.certificate_path.empty()) {
     BeginPhase(log, "writing " + command.certificate_path);
@@ -222,10 +213,7 @@ int RunModelChecker(const std::vector<std::string>& arguments) {
                       "are wrong, which images are weakly held, and what to do "
                       "next; writes the model without what is wrong");
   AddCheckerOptions(&command, &parser);
-  if (!parser.Parse(arguments)) {
-    PrintTable(command.common.log, parser.Help());
-    return kExitDone;
-  }
+  if (!ParseOrPrintHelp(arguments, command.common, &parser)) return kExitDone;
   return Run(command, parser);
 }
 

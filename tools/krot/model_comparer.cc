@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/colors.h"
 #include "krot/analysis/model_comparison.h"
+#include "krot/analysis/model_statistics.h"
 #include "krot/base/write_file.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/report/reports.h"
@@ -81,8 +81,7 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
                     "The format of the overlay");
   AddOverwrite(&options->overwrite, parser);
   AddOnContradiction(&options->on_contradiction, parser);
-  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
-                   &options->common, parser);
+  AddCommonOptions(&options->common, parser);
 }
 
 WriteModelOptions OverlayWriteOptions(const ComparerOptions& options) {
@@ -200,10 +199,7 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
                       "shows how two COLMAP models of the same images differ: "
                       "poses, points and reprojection errors");
   AddComparerOptions(&options, &parser);
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.common.log, parser.Help());
-    return kExitDone;
-  }
+  if (!ParseOrPrintHelp(arguments, options.common, &parser)) return kExitDone;
   CheckComparerPaths(options, parser);
   const auto [model1, contradictions1, poses1] = ReadValidModel(
       options.input_path1, options.on_contradiction, options.common.log);

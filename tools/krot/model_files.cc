@@ -81,9 +81,8 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser,
   parser->AddPath("input_path", &paths->input_path, true, "a folder",
                   "The COLMAP model to read, binary or text");
   const bool is_required = output_meaning == nullptr;
-  parser->AddPath(
-      "output_path", &paths->output_path, is_required, "a folder",
-      std::string(is_required ? "Where the model goes" : output_meaning) + "");
+  parser->AddPath("output_path", &paths->output_path, is_required, "a folder",
+                  is_required ? "Where the model goes" : output_meaning);
   parser->AddChoice("output_type", &paths->output_type, {"auto", "BIN", "TXT"},
                     "The format to write; auto: the input's");
   AddOverwrite(&paths->overwrite, parser);
@@ -134,9 +133,8 @@ void AddPositionsPath(ModelPaths* paths, OptionParser* parser) {
 
 void CheckPositionsPath(const ModelPaths& paths, const OptionParser& parser) {
   if (paths.positions_path.empty() && paths.point_positions_path.empty()) {
-    for (const char* name : {"Problem.position_radius", "positions_frame"}) {
-      parser.Refuse(name, "without --positions_path or --point_positions_path");
-    }
+    parser.RefuseAll({"Problem.position_radius", "positions_frame"},
+                     "without --positions_path or --point_positions_path");
   }
   if (paths.positions_frame != "own") {
     parser.Refuse("output_frame", "without --positions_frame own");
@@ -185,6 +183,18 @@ void CheckSidePath(const std::string& option, const std::string& path,
   if (path.empty()) return;
   CheckSideName(option, path);
   CheckFileWritable(path, folder_to_come);
+}
+
+void CheckOwnFolder(const std::string& option, const std::string& path,
+                    const std::vector<std::string>& others,
+                    const WriteModelOptions& options) {
+  if (path.empty()) return;
+  for (const std::string& other : others) {
+    if (!IsSamePath(path, other)) continue;
+    throw OptionError("--" + option + " = " + path +
+                      ", must be a folder of its own");
+  }
+  CheckWritable(path, options);
 }
 
 void ThrowInterrupted(const ModelPaths& paths) {
@@ -268,6 +278,15 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
   }
   run->seconds_read = timer.Seconds();
   return std::move(read.model);
+}
+
+void WriteOutput(const Model& model, const ModelPaths& paths,
+                 const WriteModelOptions& options, const LogOptions& log,
+                 RunRecord* run) {
+  BeginPhase(log, "writing " + paths.output_path);
+  const Timer timer;
+  WriteModel(model, paths.output_path, options);
+  run->seconds_write = timer.Seconds();
 }
 
 FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model,

@@ -92,6 +92,17 @@ ValidModel ReadValidModel(const std::string& path,
 Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
                 bool needs_observations = true);
 
+// Writes the model to paths.output_path, and to `run` how long that took.
+void WriteOutput(const Model& model, const ModelPaths& paths,
+                 const WriteModelOptions& options, const LogOptions& log,
+                 RunRecord* run);
+
+// Checks that --`option`, where a model goes to be looked at, is none of the
+// `others`, and can be written to; "" stands for none.
+void CheckOwnFolder(const std::string& option, const std::string& path,
+                    const std::vector<std::string>& others,
+                    const WriteModelOptions& options);
+
 // Warns of a result, which is not the input given back, in which points fit
 // only because they have degenerated, and of one whose images' side is worse
 // than before, if the model contradicts itself.

@@ -107,8 +107,8 @@ void AddSynthesizerOptions(SynthesizerOptions* options, OptionParser* parser) {
   AddOverwrite(&options->overwrite, parser);
   AddContents(options, parser);
   AddImperfections(&options->scene, parser);
-  AddCommonOptions("Equal seeds and options give equal models",
-                   &options->common, parser);
+  AddCommonOptions(&options->common, parser,
+                   "Equal seeds and options give equal models");
 }
 
 SceneOptions ToSceneOptions(const SynthesizerOptions& options) {
@@ -165,10 +165,7 @@ int RunModelSynthesizer(const std::vector<std::string>& arguments) {
   OptionParser parser("model_synthesizer",
                       "makes a COLMAP model with known ground truth");
   AddSynthesizerOptions(&options, &parser);
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.common.log, parser.Help());
-    return kExitDone;
-  }
+  if (!ParseOrPrintHelp(arguments, options.common, &parser)) return kExitDone;
   const SceneOptions scene_options = ToSceneOptions(options);
   WriteModelOptions write_options;
   write_options.format =

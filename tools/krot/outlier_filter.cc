@@ -2,7 +2,7 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/colors.h"
+#include "krot/analysis/model_statistics.h"
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"
 #include "krot/options/command_options.h"
@@ -55,8 +55,7 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
   parser->AddOutputFile("OutlierFilter.profile_path", &command->profile_path,
                         "Where the error profile goes, as JSON: the largest "
                         "error against the number removed; also on the page");
-  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
-                   &command->common, parser);
+  AddCommonOptions(&command->common, parser);
 }
 
 void CheckPairs(const OptionParser& parser, OutlierCommand* resolved) {
@@ -102,19 +101,11 @@ WriteModelOptions CheckPaths(const OutlierCommand& command) {
   CheckSidePath("outliers_path", command.outliers_path, paths.output_path);
   CheckSidePath("OutlierFilter.profile_path", command.profile_path,
                 paths.output_path);
-  std::vector<std::string> taken = {paths.input_path, paths.output_path};
-  for (const auto& [name, path] :
-       {std::pair("suspects_path", command.suspects_path),
-        std::pair("overlay_path", command.overlay_path)}) {
-    if (path.empty()) continue;
-    for (const std::string& other : taken) {
-      if (!IsSamePath(path, other)) continue;
-      throw OptionError("--" + std::string(name) + " = " + path +
-                        ", must be a folder of its own");
-    }
-    CheckWritable(path, write_options);
-    taken.push_back(path);
-  }
+  CheckOwnFolder("suspects_path", command.suspects_path,
+                 {paths.input_path, paths.output_path}, write_options);
+  CheckOwnFolder("overlay_path", command.overlay_path,
+                 {paths.input_path, paths.output_path, command.suspects_path},
+                 write_options);
   return write_options;
 }
 
@@ -178,10 +169,7 @@ int Run(const OutlierCommand& command) {
                        "nothing to solve: no track keeps two observations");
   }
 
-  BeginPhase(log, "writing " + paths.output_path);
-  const Timer write_timer;
-  WriteModel(result.model, paths.output_path, write_options);
-  report.run.seconds_write = write_timer.Seconds();
+  WriteOutput(result.model, paths, write_options, log, &report.run);
   RecordEnd(total_timer, command.context.num_threads, &report.run);
   WriteSideFiles(command, report);
   WriteViews(command, report.summary, write_options, model, result.model);
@@ -214,10 +202,7 @@ int RunOutlierFilter(const std::vector<std::string>& arguments) {
                       "a bound, and proves how many must go; rotations, "
                       "intrinsics and the coordinate frame stay");
   AddOutlierOptions(&command, &parser);
-  if (!parser.Parse(arguments)) {
-    PrintTable(command.common.log, parser.Help());
-    return kExitDone;
-  }
+  if (!ParseOrPrintHelp(arguments, command.common, &parser)) return kExitDone;
   CheckPairs(parser, &command);
   return Run(command);
 }

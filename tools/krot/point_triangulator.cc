@@ -49,21 +49,19 @@ void AddMatchesOptions(MatchesCommand* command, OptionParser* parser) {
 void RefuseOfOtherKind(const MatchesCommand& command,
                        const OptionParser& parser) {
   if (command.database_path.empty()) {
-    for (const char* name :
-         {"image_path", "clear_points", "Mapper.filter_max_reproj_error",
-          "Mapper.filter_min_tri_angle"}) {
-      parser.Refuse(name, "without --database_path");
-    }
+    parser.RefuseAll(
+        {"image_path", "clear_points", "Mapper.filter_max_reproj_error",
+         "Mapper.filter_min_tri_angle"},
+        "without --database_path");
     return;
   }
-  for (const char* name :
-       {"Solver.norm", "Solver.settings", "write_on_interrupt",
-        "FastDescent.stationarity_tolerance", "FastDescent.step_tolerance",
-        "FastDescent.slope_probe", "FastDescent.active_tolerance",
-        "FastDescent.max_step", "FastDescent.max_iterations",
-        "Problem.min_track_length", "Problem.same_image"}) {
-    parser.Refuse(name, "with --database_path");
-  }
+  parser.RefuseAll(
+      {"Solver.norm", "Solver.settings", "write_on_interrupt",
+       "FastDescent.stationarity_tolerance", "FastDescent.step_tolerance",
+       "FastDescent.slope_probe", "FastDescent.active_tolerance",
+       "FastDescent.max_step", "FastDescent.max_iterations",
+       "Problem.min_track_length", "Problem.same_image"},
+      "with --database_path");
 }
 
 // Each point's colour becomes the mean of its pixels, in all photos that have
@@ -155,10 +153,7 @@ int RunOnMatches(const SolveCommand& command, const MatchesCommand& matches) {
   report.num_observations =
       static_cast<int64_t>(result.model.track_elements.size());
   report.pixel_error = Summarize(PixelErrors(result.model, num_threads));
-  BeginPhase(log, "writing " + paths.output_path);
-  const Timer write_timer;
-  WriteModel(result.model, paths.output_path, write_options);
-  report.run.seconds_write = write_timer.Seconds();
+  WriteOutput(result.model, paths, write_options, log, &report.run);
   RecordEnd(total_timer, num_threads, &report.run);
   WriteReports(paths.report_path, paths.html_path, TrackJson(report),
                result.model, result.model, num_threads, log);
@@ -182,12 +177,8 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
   AddWriteOnInterrupt(&command.paths, &parser);
   AddSolveOptions(&command.options.solve, &command.context, &parser);
   AddMatchesOptions(&matches, &parser);
-  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
-                   &command.common, &parser);
-  if (!parser.Parse(arguments)) {
-    PrintTable(command.common.log, parser.Help());
-    return kExitDone;
-  }
+  AddCommonOptions(&command.common, &parser);
+  if (!ParseOrPrintHelp(arguments, command.common, &parser)) return kExitDone;
   RefuseOfOtherKind(matches, parser);
   if (!matches.database_path.empty()) return RunOnMatches(command, matches);
   CheckSolveOptions(command.options.solve, parser);

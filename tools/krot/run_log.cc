@@ -10,7 +10,7 @@
 #include "krot/base/context.h"
 #include "krot/base/system.h"
 #include "krot/base/write_file.h"
-#include "krot/convert/model_digest.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/model/model_io.h"
 #include "krot/report/text_table.h"
 #include "krot/version.h"

@@ -37,11 +37,10 @@ void ResolveDatabase(const OptionParser& parser, SolveCommand* command) {
     throw OptionError(
         "--database_path needs --Solver.method auto and --Solver.norm 2");
   }
-  for (const char* name : {"fixed_images_path", "fixed_points_path",
-                           "positions_path", "point_positions_path",
-                           "Problem.init_max_error", "Solver.finish_slack"}) {
-    parser.Refuse(name, "with --database_path, which starts from nothing");
-  }
+  parser.RefuseAll(
+      {"fixed_images_path", "fixed_points_path", "positions_path",
+       "point_positions_path", "Problem.init_max_error", "Solver.finish_slack"},
+      "with --database_path, which starts from nothing");
   if (!options.max_error) {
     options.max_error = MatchTracksOptions().max_error_px;
   }
@@ -84,12 +83,8 @@ int RunSolver(const std::vector<std::string>& arguments) {
                        "With Solver.max_error: where the proof goes of how "
                        "many observations must be left out, as JSON");
   AddSolverOptions(&command.options, &command.context, &parser);
-  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
-                   &command.common, &parser);
-  if (!parser.Parse(arguments)) {
-    PrintTable(command.common.log, parser.Help());
-    return kExitDone;
-  }
+  AddCommonOptions(&command.common, &parser);
+  if (!ParseOrPrintHelp(arguments, command.common, &parser)) return kExitDone;
   ResolveSolverOptions(parser, &command.options.solve);
   ResolveDatabase(parser, &command);
   CheckPositionsPath(command.paths, parser);

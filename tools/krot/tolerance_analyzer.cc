@@ -49,8 +49,7 @@ void AddCommandOptions(ToleranceCommand* command, OptionParser* parser) {
                      "How many boxes to list at most, the widest");
   AddHtmlPath(&paths->html_path, parser);
   AddOnContradiction(&paths->on_contradiction, parser);
-  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
-                   &command->common, parser);
+  AddCommonOptions(&command->common, parser);
 }
 
 void CheckPairs(const OptionParser& parser) {
@@ -159,10 +158,7 @@ int RunToleranceAnalyzer(const std::vector<std::string>& arguments) {
       "within a bound, proved; rotations and intrinsics as given. It is no "
       "covariance, and says nothing about rotations that are wrong");
   AddCommandOptions(&command, &parser);
-  if (!parser.Parse(arguments)) {
-    PrintTable(command.common.log, parser.Help());
-    return kExitDone;
-  }
+  if (!ParseOrPrintHelp(arguments, command.common, &parser)) return kExitDone;
   CheckPairs(parser);
   return Run(command);
 }

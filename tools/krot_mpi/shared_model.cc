@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "krot/convert/model_digest.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 

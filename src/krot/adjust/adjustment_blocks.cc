@@ -1,7 +1,6 @@
 #include "krot/adjust/adjustment_blocks.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <map>
 #include <numeric>

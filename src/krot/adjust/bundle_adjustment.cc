@@ -5,8 +5,6 @@
 #include <cmath>
 #include <memory>
 #include <set>
-#include <utility>
-#include <vector>
 
 #include <ceres/solver.h>
 #include <glog/logging.h>

@@ -13,6 +13,7 @@
 #include "krot/check.h"
 #include "krot/geometry.h"
 #include "krot/geometry/transform.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {
@@ -99,7 +100,7 @@ class PrecisionOfAdjustment {
 
   // Describes what needs no derivatives: errors, images and points.
   void DescribeErrors() {
-    const auto indices = ImageIndices(model_);
+    const std::vector<int32_t> image_of = ImagesOfElements(model_);
     const std::vector<ProjectedError> errors =
         *ProjectErrors(blocks_, kInfinity, num_threads_);
     std::vector<Vector3d> centers;
@@ -112,7 +113,7 @@ class PrecisionOfAdjustment {
       const AdjustmentObservation& o = blocks_.observations[i];
       ObservationPrecision observation;
       observation.element = o.element;
-      observation.image = indices.at(model_.track_elements[o.element].image_id);
+      observation.image = image_of[o.element];
       observation.residual_px = errors[i].r;
       const double square = errors[i].r.squaredNorm();
       squared_error_ += square;
@@ -148,13 +149,10 @@ class PrecisionOfAdjustment {
   }
 
   void DescribePoints() {
-    const auto num_points = static_cast<int64_t>(result_.points.size());
-    ParallelFor(num_points, /*chunk_size=*/64, num_threads_,
-                [&](int64_t begin, int64_t end, int) {
-                  for (int64_t n = begin; n < end; ++n) {
-                    DescribePoint(&result_.points[n]);
-                  }
-                });
+    ParallelForEach(
+        static_cast<int64_t>(result_.points.size()), num_threads_,
+        [&](int64_t n) { DescribePoint(&result_.points[n]); },
+        /*chunk_size=*/64);
   }
 
   void DescribePoint(PointPrecision* point) {

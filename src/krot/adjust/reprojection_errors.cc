@@ -6,6 +6,7 @@
 
 #include <ceres/jet.h>
 
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/models.h"
@@ -229,8 +230,7 @@ std::vector<int32_t> ErrorJacobians::BlocksOf(int64_t begin,
   for (int64_t i = begin; i < end; ++i) {
     all.insert(all.end(), blocks(i), blocks(i) + num_blocks(i));
   }
-  std::sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
+  SortUnique(&all);
   return all;
 }
 

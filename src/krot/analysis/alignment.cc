@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <string_view>
 #include <tuple>
 #include <unordered_map>
 
@@ -164,13 +163,12 @@ class TrackIndex {
     for (const Image& image : model.images) {
       elements_.emplace_back(image.points2D.size());
     }
-    const std::unordered_map<ImageId, int32_t> indices = ImageIndices(model);
+    const std::vector<int32_t> image_of = ImagesOfElements(model);
     for (size_t k = 0; k < model.points3D.size(); ++k) {
       const Point3D& point = model.points3D[k];
       for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-        const TrackElement& element = model.track_elements[e];
         std::optional<uint64_t>& last =
-            elements_[indices.at(element.image_id)][element.point2D_idx];
+            elements_[image_of[e]][model.track_elements[e].point2D_idx];
         others_[e] = last;
         last = e;
         points_[e] = static_cast<int32_t>(k);
@@ -221,10 +219,7 @@ void PairElements(const TrackIndex& index1, const TrackIndex& index2,
 }
 
 std::vector<IndexPair> MatchImages(const Model& model1, const Model& model2) {
-  std::unordered_map<std::string_view, int32_t> by_name;
-  for (size_t n = 0; n < model2.images.size(); ++n) {
-    by_name.emplace(model2.images[n].name, static_cast<int32_t>(n));
-  }
+  auto by_name = ImagesByName(model2);
   std::vector<IndexPair> pairs;
   for (size_t n = 0; n < model1.images.size(); ++n) {
     const auto found = by_name.find(model1.images[n].name);

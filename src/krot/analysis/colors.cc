@@ -1,4 +1,4 @@
-#include "krot/analysis/colors.h"
+#include "krot/analysis/model_statistics.h"
 
 #include <algorithm>
 #include <cmath>

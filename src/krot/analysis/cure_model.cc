@@ -41,7 +41,7 @@ Model Removed(const Model& model, const ModelCheck& check,
   for (const ImageCheck& image : check.images) {
     is_wrong_image.push_back(image.verdict == ImageVerdict::kWrong);
   }
-  const auto image_of = ImageIndices(model);
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
   std::vector<char> is_removed(model.track_elements.size(), 0);
   for (const WrongObservation& one : check.observations) {
     is_removed[one.element] = 1;
@@ -51,8 +51,7 @@ Model Removed(const Model& model, const ModelCheck& check,
     const Point3D& point = model.points3D[k];
     bool is_any = false;
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      is_removed[e] |=
-          is_wrong_image[image_of.at(model.track_elements[e].image_id)];
+      is_removed[e] |= is_wrong_image[image_of[e]];
       is_any |= is_removed[e];
     }
     if (is_any) moved.points3D[k].xyz = check.points[k];

@@ -18,30 +18,6 @@
 
 namespace krot::internal {
 
-// A pixel's ray, and its derivatives by the pixel's two coordinates.
-struct PixelRay {
-  Eigen::Vector3d ray;
-  Eigen::Matrix<double, 3, 2> by_pixel;
-};
-
-inline PixelRay operator*(const Eigen::Matrix3d& rotation,
-                          const PixelRay& pixel) {
-  return {rotation * pixel.ray, rotation * pixel.by_pixel};
-}
-
-// The ray of a pixel in camera axes; none if no ray less than 90 degrees off
-// the axis projects to the pixel, and for cameras without an image plane.
-inline std::optional<PixelRay> RayOf(const Camera& camera,
-                                     const Eigen::Vector2d& pixel) {
-  const auto undistorted =
-      UndistortPixel(camera.model_id, camera.params.data(), pixel);
-  if (!undistorted) return std::nullopt;
-  PixelRay ray;
-  ray.ray = undistorted->u.homogeneous();
-  ray.by_pixel << undistorted->J.inverse(), 0, 0;
-  return ray;
-}
-
 // A match of two images whose rotations are known, as a condition on the
 // baseline b, the direction from one centre to the other: b, and the rays d1
 // and d2 of the two pixels, all in world axes, lie in one plane if

@@ -17,7 +17,7 @@
 
 namespace krot::internal {
 
-// The robust similarity search behind FindPositionFrame (position_frame.h).
+// The robust similarity search behind FindPositionFrame (model_input.h).
 
 // In units of the median distance: one of a thousand Gaussian errors in three
 // dimensions is farther off.

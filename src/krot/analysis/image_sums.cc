@@ -82,12 +82,7 @@ double LargestSpread(const Matrix3d& A, const Matrix3d& B, const Matrix3d& C) {
 class ImageAdder {
  public:
   ImageAdder(const Model& model, const ModelNoise& noise)
-      : model_(model), noise_(noise) {
-    const auto indices = ImageIndices(model);
-    for (const TrackElement& element : model.track_elements) {
-      image_of_.push_back(indices.at(element.image_id));
-    }
-  }
+      : model_(model), noise_(noise), image_of_(ImagesOfElements(model)) {}
 
   std::vector<ImageSums> Run() {
     const std::vector<ImageGeometry> geometries = ImageGeometries(model_);
@@ -155,7 +150,7 @@ class ImageAdder {
 
   const Model& model_;
   const ModelNoise& noise_;
-  std::vector<int32_t> image_of_;  // by track element
+  const std::vector<int32_t> image_of_;  // by track element
   std::vector<ImageSums> sums_;
   std::vector<double> nearest_;  // distance of a point, by image; scene units
 };

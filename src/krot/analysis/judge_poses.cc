@@ -372,10 +372,9 @@ class PoseJudge {
 
   template <typename Body>
   void ForEach(const std::vector<int32_t>& images, const Body& body) const {
-    ParallelFor(static_cast<int64_t>(images.size()), 1, num_threads_,
-                [&](int64_t begin, int64_t end, int /*worker*/) {
-                  for (int64_t n = begin; n < end; ++n) body(images[n]);
-                });
+    ParallelForEach(
+        static_cast<int64_t>(images.size()), num_threads_,
+        [&](int64_t n) { body(images[n]); }, /*chunk_size=*/1);
   }
 
   const MatchRays& rays_;

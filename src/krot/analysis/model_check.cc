@@ -24,11 +24,10 @@ class Checker {
  public:
   Checker(const Model& model, const ModelCheckOptions& options,
           const Context& context)
-      : model_(model), options_(options), context_(context) {
-    const auto indices = ImageIndices(model);
-    for (const TrackElement& element : model.track_elements) {
-      image_of_.push_back(indices.at(element.image_id));
-    }
+      : model_(model),
+        options_(options),
+        context_(context),
+        image_of_(ImagesOfElements(model)) {
     noise_options_.false_alarm = options.false_alarm;
     noise_options_.is_left_out.assign(image_of_.size(), 0);
     const auto odd = FindOddFocalLengths(model);
@@ -369,8 +368,8 @@ class Checker {
   const Model& model_;
   const ModelCheckOptions& options_;
   const Context& context_;
-  std::vector<int32_t> image_of_;      // by track element
-  std::vector<ErrorsInDisc> in_disc_;  // by image, in the model as it stands
+  const std::vector<int32_t> image_of_;  // by track element
+  std::vector<ErrorsInDisc> in_disc_;    // by image, in the model as it stands
   NoiseOptions noise_options_;
   NoiseSnooping snooping_;
   std::vector<ImageSums> sums_;  // as Model::images

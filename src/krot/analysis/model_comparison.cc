@@ -34,8 +34,8 @@ std::vector<double> TypicalDistances(const Model& model,
   std::vector<double> distances;
   std::vector<int32_t> image_of;
   for (const Point3D& point : model.points3D) {
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      const int32_t n = *index.Find(model.track_elements[e].image_id);
+    for (const TrackElement& element : TrackOf(model, point)) {
+      const int32_t n = *index.Find(element.image_id);
       image_of.push_back(images[n].has_pose ? n : -1);
       distances.push_back((images[n].cam_from_world * point.xyz).norm());
     }
@@ -136,10 +136,7 @@ void ComparePoints(const Model& model1, const Model& model2,
     distances.push_back(distance);
   }
   summary->point = SummarizeDifferences(std::move(distances));
-  std::stable_sort(moved.begin(), moved.end(),
-                   [](const PointDifference& a, const PointDifference& b) {
-                     return a.distance > b.distance;
-                   });
+  SortLargestFirst(&moved, &PointDifference::distance);
   moved.resize(std::min(moved.size(), static_cast<size_t>(num_worst)));
   summary->worst_points = std::move(moved);
 }
@@ -302,8 +299,8 @@ Collapse FindCollapse(const Model& before, const Model& after,
   Collapse collapse;
   for (const Point3D& point : after.points3D) {
     std::vector<int32_t> images;
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      images.push_back(image_indices.at(after.track_elements[e].image_id));
+    for (const TrackElement& element : TrackOf(after, point)) {
+      images.push_back(image_indices.at(element.image_id));
     }
     const Point3D& origin = before.points3D[*points_before.Find(point.id)];
     const Shape then = ShapeOf(origin.xyz, images, centres_before);

@@ -30,13 +30,12 @@ struct SideFit {
 std::optional<SideFit> Measure(const Model& model, int64_t num_unknown) {
   const std::vector<double> errors_px = PixelErrors(model);
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
-  const auto image_indices = ImageIndices(model);
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
   std::vector<double> px(num_unknown, kInfinity);
   std::vector<double> relative = px;
   SideFit fit;
   for (size_t e = 0; e < errors_px.size(); ++e) {
-    const ImageGeometry& image =
-        geometries[image_indices.at(model.track_elements[e].image_id)];
+    const ImageGeometry& image = geometries[image_of[e]];
     if (!image.has_pose) continue;
     const Camera& camera = model.cameras[image.camera];
     const auto side = static_cast<double>(

@@ -3,13 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include <Eigen/Geometry>
+
+#include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
+#include "krot/camera/camera_model.h"
+#include "krot/minimax/residual_set.h"
+#include "krot/model.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {
@@ -18,11 +25,10 @@ namespace {
 // The errors of the track elements, gathered by the index of their image.
 std::vector<std::vector<double>> GroupByImage(
     const Model& model, const std::vector<double>& errors_px) {
-  const std::unordered_map<ImageId, int32_t> indices = ImageIndices(model);
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
   std::vector<std::vector<double>> groups(model.images.size());
   for (size_t e = 0; e < errors_px.size(); ++e) {
-    groups[indices.at(model.track_elements[e].image_id)].push_back(
-        errors_px[e]);
+    groups[image_of[e]].push_back(errors_px[e]);
   }
   return groups;
 }
@@ -218,9 +224,8 @@ DepthStatistics ComputeDepthStatistics(const Model& model) {
   std::vector<double> depths;
   depths.reserve(model.track_elements.size());
   for (const Point3D& point : model.points3D) {
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      const ImageGeometry& image =
-          geometries[indices.at(model.track_elements[e].image_id)];
+    for (const TrackElement& element : TrackOf(model, point)) {
+      const ImageGeometry& image = geometries[indices.at(element.image_id)];
       if (!image.has_pose) continue;
       depths.push_back(image.cam_from_world.rotation.row(2).dot(point.xyz) +
                        image.cam_from_world.translation.z());
@@ -234,21 +239,16 @@ ValueRange TriangulationAnglesDeg(const Model& model, int num_threads) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const std::unordered_map<ImageId, int32_t> indices = ImageIndices(model);
   std::vector<double> angles(model.points3D.size(), kNoAngle);
-  ParallelFor(
-      static_cast<int64_t>(angles.size()), kItemsPerChunk, num_threads,
-      [&](int64_t begin, int64_t end, int) {
+  ParallelForEach(
+      static_cast<int64_t>(angles.size()), num_threads, [&](int64_t k) {
         std::vector<Vector3d> rays;
-        for (int64_t k = begin; k < end; ++k) {
-          const Point3D& point = model.points3D[k];
-          rays.clear();
-          for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-            const ImageGeometry& image =
-                geometries[indices.at(model.track_elements[e].image_id)];
-            if (!image.has_pose) continue;
-            rays.push_back(Center(image.cam_from_world) - point.xyz);
-          }
-          angles[k] = LargestAngle(rays);
+        const Point3D& point = model.points3D[k];
+        for (const TrackElement& element : TrackOf(model, point)) {
+          const ImageGeometry& image = geometries[indices.at(element.image_id)];
+          if (!image.has_pose) continue;
+          rays.push_back(Center(image.cam_from_world) - point.xyz);
         }
+        angles[k] = LargestAngle(rays);
       });
   angles.erase(std::remove(angles.begin(), angles.end(), kNoAngle),
                angles.end());
@@ -257,3 +257,129 @@ ValueRange TriangulationAnglesDeg(const Model& model, int num_threads) {
 }
 
 }  // namespace krot::internal
+
+namespace krot {
+
+using namespace internal;
+
+namespace {
+
+// x_cam = q x q^-1 + t.
+struct CameraPose {
+  Eigen::Quaterniond rotation;
+  Eigen::Vector3d translation;
+};
+
+// Normalised when read and again when used, and applied to points as a
+// quaternion: these are the operations of COLMAP 3.8. Where a point nearly
+// coincides with a camera centre, rounding decides its error, and should decide
+// alike.
+Eigen::Quaterniond NormalizedTwice(const Pose& pose) {
+  Eigen::Vector4d q(pose.quaternion_wxyz.data());
+  q /= q.norm();
+  q /= q.norm();
+  return {q[0], q[1], q[2], q[3]};
+}
+
+std::optional<CameraPose> CameraPoseOf(const Model& model,
+                                       const ImageGeometry& geometry) {
+  if (!geometry.has_pose) return std::nullopt;
+  const bool is_frame_pose =
+      geometry.cam_from_rig.rotation == Eigen::Matrix3d::Identity() &&
+      geometry.cam_from_rig.translation == Eigen::Vector3d::Zero();
+  if (!is_frame_pose) {
+    return CameraPose{Eigen::Quaterniond(geometry.cam_from_world.rotation),
+                      geometry.cam_from_world.translation};
+  }
+  const Pose& pose = model.frames[geometry.frame].rig_from_world;
+  return CameraPose{NormalizedTwice(pose), pose.translation};
+}
+
+double PixelError(const CameraPose& pose, const Camera& camera,
+                  const Point2D& point2D, const Eigen::Vector3d& xyz,
+                  Norm norm) {
+  const Eigen::Vector3d x_cam = pose.rotation * xyz + pose.translation;
+  const std::optional<Eigen::Vector2d> difference = ProjectionError(
+      camera.model_id, camera.params.data(), {point2D.x, point2D.y}, x_cam);
+  if (!difference) return kNaN;
+  const double error = NormOf(*difference, norm);
+  return std::isfinite(error) ? error : kNaN;
+}
+
+}  // namespace
+
+std::vector<double> PixelErrors(const Model& model, int num_threads,
+                                Norm norm) {
+  const std::unordered_map<ImageId, int32_t> image_indices =
+      ImageIndices(model);
+  std::vector<std::optional<CameraPose>> poses;
+  std::vector<const Camera*> cameras;
+  for (const ImageGeometry& geometry : ImageGeometries(model)) {
+    poses.push_back(CameraPoseOf(model, geometry));
+    cameras.push_back(&model.cameras[geometry.camera]);
+  }
+
+  std::vector<double> errors_px(model.track_elements.size(), kNaN);
+  ParallelFor(
+      static_cast<int64_t>(model.points3D.size()), kItemsPerChunk, num_threads,
+      [&](int64_t begin, int64_t end, int) {
+        for (int64_t k = begin; k < end; ++k) {
+          const Point3D& point = model.points3D[k];
+          for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+            const TrackElement& element = model.track_elements[e];
+            const int32_t n = image_indices.at(element.image_id);
+            if (!poses[n]) continue;
+            errors_px[e] = PixelError(
+                *poses[n], *cameras[n],
+                model.images[n].points2D[element.point2D_idx], point.xyz, norm);
+          }
+        }
+      });
+  return errors_px;
+}
+
+PixelErrorStatistics Summarize(const std::vector<double>& errors_px) {
+  std::vector<double> finite;
+  finite.reserve(errors_px.size());
+  double sum = 0;
+  double sum_of_squares = 0;
+  for (const double error : errors_px) {
+    if (!std::isfinite(error)) continue;
+    finite.push_back(error);
+    sum += error;
+    sum_of_squares += error * error;
+  }
+
+  PixelErrorStatistics statistics;
+  statistics.count = static_cast<int64_t>(finite.size());
+  statistics.not_finite =
+      static_cast<int64_t>(errors_px.size()) - statistics.count;
+  if (finite.empty()) return statistics;
+  const double count = static_cast<double>(finite.size());
+  statistics.mean = sum / count;
+  statistics.rms = std::sqrt(sum_of_squares / count);
+  // ceil(0.99 n)-th smallest, in integers.
+  const auto rank = finite.begin() + ((99 * statistics.count + 99) / 100 - 1);
+  std::nth_element(finite.begin(), rank, finite.end());
+  statistics.p99 = *rank;
+  statistics.max = *std::max_element(rank, finite.end());
+  return statistics;
+}
+
+void UpdatePointErrors(const std::vector<double>& errors_px, Model* model) {
+  CheckArgument(errors_px.size() == model->track_elements.size(),
+                "errors_px.size()", errors_px.size(),
+                "the number of track elements");
+  for (Point3D& point : model->points3D) {
+    double sum = 0;
+    int64_t count = 0;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      if (!std::isfinite(errors_px[e])) continue;
+      sum += errors_px[e];
+      ++count;
+    }
+    point.error = count > 0 ? sum / static_cast<double>(count) : -1;
+  }
+}
+
+}  // namespace krot

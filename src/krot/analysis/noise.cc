@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <string>
 #include <utility>
 
@@ -90,9 +89,7 @@ class Snooper {
     for (size_t e = 0; e < options.is_left_out.size(); ++e) {
       if (options.is_left_out[e]) tracks_.Remove(e);
     }
-    std::vector<int64_t> all(model.points3D.size());
-    std::iota(all.begin(), all.end(), int64_t{0});
-    Fit(all);
+    Fit(NumbersUpTo<int64_t>(static_cast<int64_t>(model.points3D.size())));
     Measure();
   }
 
@@ -126,10 +123,8 @@ class Snooper {
 };
 
 void Snooper::Fit(const std::vector<int64_t>& points) {
-  ParallelFor(static_cast<int64_t>(points.size()), kItemsPerChunk,
-              context_.num_threads, [&](int64_t begin, int64_t end, int) {
-                for (int64_t n = begin; n < end; ++n) tracks_.Fit(points[n]);
-              });
+  ParallelForEach(static_cast<int64_t>(points.size()), context_.num_threads,
+                  [&](int64_t n) { tracks_.Fit(points[n]); });
 }
 
 void Snooper::Measure() {
@@ -202,8 +197,7 @@ NoiseSnooping Snooper::Snoop() {
   for (SnoopedObservation& one : removed) {
     one.error_px = tracks_.ErrorOf(one.element).norm();
   }
-  std::stable_sort(removed.begin(), removed.end(),
-                   [](const auto& a, const auto& b) { return a.w > b.w; });
+  SortLargestFirst(&removed, &SnoopedObservation::w);
   result.noise = TakeNoise();
   return result;
 }

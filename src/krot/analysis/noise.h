@@ -112,8 +112,8 @@ class TrackNoise {
 
   const Model& model_;
   const std::vector<double>& relative_sigmas_;
-  std::vector<View> views_;        // as Model::images
-  std::vector<int32_t> image_of_;  // by track element
+  std::vector<View> views_;              // as Model::images
+  const std::vector<int32_t> image_of_;  // by track element
   std::vector<int32_t> point_of_;
   std::vector<char> takes_part_;
   std::vector<ObservationNoise> observations_;

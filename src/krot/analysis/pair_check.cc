@@ -1,7 +1,6 @@
 #include "krot/database.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-#include "krot/analysis/position_frame.h"
+#include "krot/analysis/model_input.h"
 
 #include <algorithm>
 #include <cmath>
@@ -193,18 +193,11 @@ class FrameFinder {
       if (is_wrong[pair.index] == 0) continue;
       const Vector3d offset = OffsetAt(own_from_model_, pair);
       const double misfit = (pair.unit_from_own * offset).norm();
-      const KnownPosition& position = positions_[pair.index];
-      frame.wrong.push_back(
-          {pair.index,
-           position.of == KnownPosition::Of::kImage
-               ? model_.images[position.index].name
-               : "3D point " +
-                     std::to_string(model_.points3D[position.index].id),
-           offset.norm(), has_radii_ ? offset.norm() / misfit : tolerance_});
+      frame.wrong.push_back({pair.index, NameOf(model_, positions_[pair.index]),
+                             offset.norm(),
+                             has_radii_ ? offset.norm() / misfit : tolerance_});
     }
-    std::stable_sort(
-        frame.wrong.begin(), frame.wrong.end(),
-        [](const auto& a, const auto& b) { return a.distance > b.distance; });
+    SortLargestFirst(&frame.wrong, &WrongPosition::distance);
     for (size_t n = 0; n < positions_.size(); ++n) {
       if (is_wrong[n] != 0) continue;
       KnownPosition position = positions_[n];

@@ -1,8 +1,6 @@
 #include "krot/analysis/noise.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <optional>
 
 #include <Eigen/Eigenvalues>
@@ -210,6 +208,7 @@ TrackNoise::TrackNoise(const Model& model,
                        const std::vector<double>& relative_sigmas)
     : model_(model),
       relative_sigmas_(relative_sigmas),
+      image_of_(ImagesOfElements(model)),
       takes_part_(model.track_elements.size(), 0),
       observations_(model.track_elements.size()),
       squared_errors_(model.track_elements.size(), 0),
@@ -225,9 +224,7 @@ TrackNoise::TrackNoise(const Model& model,
     }
     views_.push_back(view);
   }
-  const auto image_indices = ImageIndices(model);
   for (size_t e = 0; e < model.track_elements.size(); ++e) {
-    image_of_.push_back(image_indices.at(model.track_elements[e].image_id));
     takes_part_[e] = views_[image_of_[e]].camera != nullptr;
     observations_[e] = NotTested(kNaN);
   }

@@ -4,7 +4,9 @@
 #include <charconv>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -36,6 +38,30 @@ inline double LowerMedian(std::vector<double> values) {
       values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+// 0, 1, ..., count - 1.
+template <typename Number>
+std::vector<Number> NumbersUpTo(int64_t count) {
+  std::vector<Number> numbers(count);
+  std::iota(numbers.begin(), numbers.end(), Number{0});
+  return numbers;
+}
+
+// Sorts by what `key` gives for a value, a member or a function: the largest
+// first, and equal ones in the order in which they are.
+template <typename Value, typename Key>
+void SortLargestFirst(std::vector<Value>* values, const Key& key) {
+  std::stable_sort(values->begin(), values->end(),
+                   [&](const Value& a, const Value& b) {
+                     return std::invoke(key, a) > std::invoke(key, b);
+                   });
+}
+
+template <typename Value>
+void SortUnique(std::vector<Value>* values) {
+  std::sort(values->begin(), values->end());
+  values->erase(std::unique(values->begin(), values->end()), values->end());
 }
 
 // Replace std::from_chars and std::to_chars for doubles, by functions of the C

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -88,8 +89,9 @@ inline constexpr int64_t kItemsPerChunk = 256;
 
 // Calls body(i) for every i in [0, count); it may write only what belongs to i.
 template <typename Body>
-void ParallelForEach(int64_t count, int num_threads, const Body& body) {
-  ParallelFor(count, kItemsPerChunk, num_threads,
+void ParallelForEach(int64_t count, int num_threads, const Body& body,
+                     int64_t chunk_size = kItemsPerChunk) {
+  ParallelFor(count, chunk_size, num_threads,
               [&](int64_t begin, int64_t end, int) {
                 for (int64_t i = begin; i < end; ++i) body(i);
               });
@@ -98,6 +100,22 @@ void ParallelForEach(int64_t count, int num_threads, const Body& body) {
 // The number of chunks that ParallelFor makes.
 inline int64_t NumChunks(int64_t count, int64_t chunk_size) {
   return (count + chunk_size - 1) / chunk_size;
+}
+
+// The largest value(i) of all i in [0, count), but at least 0.
+template <typename Value>
+double ParallelMax(int64_t count, int num_threads, const Value& value) {
+  std::vector<double> largest(NumChunks(count, kItemsPerChunk), 0);
+  ParallelFor(count, kItemsPerChunk, num_threads,
+              [&](int64_t begin, int64_t end, int) {
+                double of_chunk = 0;
+                for (int64_t i = begin; i < end; ++i) {
+                  of_chunk = std::max(of_chunk, value(i));
+                }
+                largest[begin / kItemsPerChunk] = of_chunk;
+              });
+  return largest.empty() ? 0
+                         : *std::max_element(largest.begin(), largest.end());
 }
 
 }  // namespace krot::internal

@@ -1,7 +1,6 @@
 #include "krot/conic/interior_point.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
 #include "krot/base/check.h"

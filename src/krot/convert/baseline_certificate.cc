@@ -1,10 +1,9 @@
-#include "krot/convert/baseline_certificate.h"
+#include "krot/convert/certificate_file.h"
 
 #include <algorithm>
 #include <array>
 #include <map>
 #include <numeric>
-#include <optional>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -58,35 +57,20 @@ struct Condition {
   }
 };
 
-struct WorldRay {
-  Vector3d ray;
-  std::array<Vector3d, 2> by_pixel;
-};
-
-std::optional<WorldRay> RayOfPixel(const Camera& camera,
-                                   const Eigen::Matrix3d& world_from_cam,
-                                   const Eigen::Vector2d& pixel) {
-  const auto undistorted =
-      UndistortPixel(camera.model_id, camera.params.data(), pixel);
-  if (!undistorted) return std::nullopt;
-  const Eigen::Matrix2d inverse = undistorted->J.inverse();
-  WorldRay ray;
-  ray.ray = world_from_cam * undistorted->u.homogeneous();
-  for (int i = 0; i < 2; ++i) {
-    ray.by_pixel[i] =
-        world_from_cam * Vector3d(inverse(0, i), inverse(1, i), 0);
-  }
-  return ray;
-}
-
 std::vector<Condition> ConditionsOf(
     const Model& model, const std::vector<ImageGeometry>& geometries,
     const Database& database, const VerifiedPair& pair) {
   std::vector<Condition> conditions;
   const auto ray = [&](int32_t image, uint32_t keypoint) {
-    return RayOfPixel(model.cameras[geometries[image].camera],
-                      geometries[image].cam_from_world.rotation.transpose(),
-                      database.keypoints[image][keypoint]);
+    const ImageGeometry& geometry = geometries[image];
+    auto in_world = RayOf(model.cameras[geometry.camera],
+                          database.keypoints[image][keypoint]);
+    if (in_world) {
+      const Eigen::Matrix3d world_from_cam =
+          geometry.cam_from_world.rotation.transpose();
+      in_world = world_from_cam * *in_world;
+    }
+    return in_world;
   };
   for (const auto& [keypoint1, keypoint2] : pair.matches) {
     const auto ray1 = ray(pair.image1, keypoint1);
@@ -95,8 +79,8 @@ std::vector<Condition> ConditionsOf(
     Condition& condition = conditions.emplace_back();
     condition.normal = Cross(ray1->ray, ray2->ray);
     for (int i = 0; i < 2; ++i) {
-      condition.gradient[i] = Cross(ray1->by_pixel[i], ray2->ray);
-      condition.gradient[2 + i] = Cross(ray1->ray, ray2->by_pixel[i]);
+      condition.gradient[i] = Cross(ray1->by_pixel.col(i), ray2->ray);
+      condition.gradient[2 + i] = Cross(ray1->ray, ray2->by_pixel.col(i));
     }
   }
   return conditions;
@@ -202,18 +186,16 @@ BaselineCertificate DescribeBaselines(const Model& model,
 }
 
 std::string BaselineJson(const BaselineCertificate& certificate) {
-  CertificateFileJson pairs = CertificateFileJson::array();
-  for (const BaselineCertificate::Pair& pair : certificate.pairs) {
-    pairs.push_back(
-        {{"image_id1", pair.image_id1},
-         {"image_id2", pair.image_id2},
-         {"num_matches", pair.num_matches},
-         {"num_explained", pair.num_explained},
-         {"most_explained", pair.most_explained},
-         {"baseline",
-          {pair.baseline.x(), pair.baseline.y(), pair.baseline.z()}},
-         {"cells", pair.cells}});
-  }
+  CertificateFileJson pairs =
+      ListJson(certificate.pairs, [&](const auto& pair) -> CertificateFileJson {
+        return {{"image_id1", pair.image_id1},
+                {"image_id2", pair.image_id2},
+                {"num_matches", pair.num_matches},
+                {"num_explained", pair.num_explained},
+                {"most_explained", pair.most_explained},
+                {"baseline", VectorJson(pair.baseline)},
+                {"cells", pair.cells}};
+      });
   CertificateFileJson json = {{"version", certificate.version},
                               {"tolerance_px", certificate.tolerance_px}};
   json["baselines"] = std::move(pairs);

@@ -1,9 +1,7 @@
 #include "krot/convert/build_problem.h"
 
-#include <algorithm>
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -90,8 +88,7 @@ int CollectRows(const Sources& sources, int32_t point,
   const bool is_fixed = options.fixed.HasPoint(point);
   int num_kept = 0;
   bool is_seen_by_all = true;
-  for (uint64_t e = point3D.track_begin; e < point3D.track_end; ++e) {
-    const TrackElement& element = sources.model.track_elements[e];
+  for (const TrackElement& element : TrackOf(sources.model, point3D)) {
     const int32_t image = sources.image_indices.at(element.image_id);
     const ImageGeometry& geometry = sources.geometries[image];
     if (!geometry.has_pose) {

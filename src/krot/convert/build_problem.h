@@ -1,10 +1,8 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -165,19 +163,6 @@ void CarryLeftOutPoints(const Model& before,
                         double level, Model* after);
 
 // ---- The steps of BuildProblem ----
-
-// Indices of the records in the order of their ids, which must be unique.
-// Results that are computed in this order do not depend on the order in the
-// file.
-template <typename Record>
-std::vector<int32_t> OrderOfIds(const std::vector<Record>& records) {
-  std::vector<int32_t> order(records.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int32_t a, int32_t b) {
-    return records[a].id < records[b].id;
-  });
-  return order;
-}
 
 // Numbers the frames that have observations, and their images as views. Before,
 // the `view` of an observation is the index of its image in the model;

@@ -7,9 +7,9 @@
 #include <sstream>
 #include <utility>
 
+#include "krot/base/numbers.h"
 #include "krot/context.h"
 #include "krot/convert/build_problem.h"
-#include "krot/convert/model_digest.h"
 #include "krot/convert/reprojection.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
@@ -22,20 +22,6 @@ struct Sighting {
   Eigen::Vector2d pixel;
   int32_t point2D;
 };
-
-// The model's cameras, rigs, frames and images only.
-Model WithoutPoints(const Model& model) {
-  Model result;
-  result.stores_rigs = model.stores_rigs;
-  result.cameras = model.cameras;
-  result.rigs = model.rigs;
-  result.frames = model.frames;
-  for (const Image& image : model.images) {
-    result.images.push_back(
-        {image.id, image.cam_from_world, image.camera_id, image.name, {}});
-  }
-  return result;
-}
 
 }  // namespace
 
@@ -182,9 +168,7 @@ std::vector<SupportPosition> ListSupportPositions(
     position.share = pull.norm() / sum;
     support.push_back(std::move(position));
   }
-  std::stable_sort(
-      support.begin(), support.end(),
-      [](const auto& a, const auto& b) { return a.share > b.share; });
+  SortLargestFirst(&support, &SupportPosition::share);
   return support;
 }
 
@@ -208,9 +192,7 @@ std::vector<SupportObservation> ListSupport(const Model& model,
          ResidualOf(ViewPoint(built.problem, observation, estimate), norm),
          HasImageTwice(built.problem, observation.point)});
   }
-  std::stable_sort(
-      support.begin(), support.end(),
-      [](const auto& a, const auto& b) { return a.error_px > b.error_px; });
+  SortLargestFirst(&support, &SupportObservation::error_px);
   return support;
 }
 

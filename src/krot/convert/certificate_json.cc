@@ -1,7 +1,5 @@
 #include "krot/convert/certificate_json.h"
 
-#include <utility>
-
 namespace krot::internal {
 
 using Json = CertificateFileJson;
@@ -88,24 +86,13 @@ Norm ReadNorm(const PlacedJson& json) {
   json.Fail("\"1\", \"2\" or \"inf\"");
 }
 
-namespace {
-
-Json TripleJson(const Eigen::Vector3d& x) { return {x[0], x[1], x[2]}; }
-
-}  // namespace
-
 Json SupportJson(
     const std::vector<CertificateFile::SupportObservation>& support) {
-  Json observations = Json::array();
-  for (const CertificateFile::SupportObservation& o : support) {
-    observations.push_back({{"image_id", o.image_id},
-                            {"point2D_idx", o.point2D_idx},
-                            {"point3D_id", o.point3D_id},
-                            {"bearing", TripleJson(o.bearing)},
-                            {"lambda", o.lambda},
-                            {"y", {o.y[0], o.y[1]}}});
-  }
-  return observations;
+  return ListJson(support, [&](const auto& o) -> Json {
+    return {{"image_id", o.image_id},     {"point2D_idx", o.point2D_idx},
+            {"point3D_id", o.point3D_id}, {"bearing", VectorJson(o.bearing)},
+            {"lambda", o.lambda},         {"y", {o.y[0], o.y[1]}}};
+  });
 }
 
 std::vector<CertificateFile::SupportObservation> ReadSupport(
@@ -124,16 +111,13 @@ std::vector<CertificateFile::SupportObservation> ReadSupport(
 namespace {
 
 Json FixedJson(const CertificateFile& file) {
-  Json images = Json::array();
-  for (const CertificateFile::FixedImage& image : file.fixed_images) {
-    images.push_back({{"image_id", image.image_id},
-                      {"translation", TripleJson(image.translation)}});
-  }
-  Json points = Json::array();
-  for (const CertificateFile::FixedPoint& point : file.fixed_points) {
-    points.push_back(
-        {{"point3D_id", point.point3D_id}, {"xyz", TripleJson(point.xyz)}});
-  }
+  Json images = ListJson(file.fixed_images, [&](const auto& image) -> Json {
+    return {{"image_id", image.image_id},
+            {"translation", VectorJson(image.translation)}};
+  });
+  Json points = ListJson(file.fixed_points, [&](const auto& point) -> Json {
+    return {{"point3D_id", point.point3D_id}, {"xyz", VectorJson(point.xyz)}};
+  });
   return {{"images", images}, {"points3D", points}};
 }
 
@@ -149,29 +133,25 @@ void ReadFixed(const PlacedJson& fixed, CertificateFile* file) {
 }
 
 Json PositionsJson(const CertificateFile& file) {
-  Json positions = Json::array();
-  for (const CertificateFile::Position& position : file.positions) {
-    Json rows = Json::array();
-    for (const CertificateFile::Position::Row& row : position.rows) {
-      rows.push_back({{"apex", TripleJson(row.apex)},
-                      {"lambda", row.lambda},
-                      {"y", {row.y[0], row.y[1]}}});
-    }
+  return ListJson(file.positions, [&](const auto& position) -> Json {
     const Ellipsoid& region = position.region;
     const bool is_images = position.of == KnownPosition::Of::kImage;
     Json json = {{is_images ? "image_id" : "point3D_id", position.id},
-                 {"xyz", TripleJson(region.centre)}};
+                 {"xyz", VectorJson(region.centre)}};
     if (region.IsBall()) {
       json["radius"] = region.semi_axes[0];
     } else {
       const Eigen::Quaterniond& q = region.world_from_axes;
-      json["semi_axes"] = TripleJson(region.semi_axes);
+      json["semi_axes"] = VectorJson(region.semi_axes);
       json["axes_qvec"] = {q.w(), q.x(), q.y(), q.z()};
     }
-    json["rows"] = rows;
-    positions.push_back(std::move(json));
-  }
-  return positions;
+    json["rows"] = ListJson(position.rows, [](const auto& row) -> Json {
+      return {{"apex", VectorJson(row.apex)},
+              {"lambda", row.lambda},
+              {"y", {row.y[0], row.y[1]}}};
+    });
+    return json;
+  });
 }
 
 void ReadPositions(const PlacedJson& positions, CertificateFile* file) {

@@ -18,6 +18,17 @@ namespace krot::internal {
 
 using CertificateFileJson = nlohmann::ordered_json;
 
+// The array of what `of` makes of each item.
+template <typename Items, typename Of>
+CertificateFileJson ListJson(const Items& items, const Of& of) {
+  CertificateFileJson list = CertificateFileJson::array();
+  for (const auto& item : items) list.push_back(of(item));
+  return list;
+}
+inline CertificateFileJson VectorJson(const Eigen::Vector3d& x) {
+  return {x[0], x[1], x[2]};
+}
+
 // A value of a parsed file, with its place there. Every error is a ModelError
 // that names the file and the place.
 class PlacedJson {

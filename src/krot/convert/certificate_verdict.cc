@@ -7,7 +7,6 @@
 #include <tuple>
 #include <utility>
 
-#include "krot/convert/model_digest.h"
 #include "krot/convert/pixel_certificate.h"
 #include "krot/convert/reprojection.h"
 #include "krot/model/derived_models.h"

@@ -11,7 +11,6 @@
 #include "krot/context.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/certificate_json.h"
-#include "krot/convert/model_digest.h"
 #include "krot/convert/pixel_certificate.h"
 #include "krot/problem/subset.h"
 

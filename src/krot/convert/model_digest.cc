@@ -1,4 +1,4 @@
-#include "krot/convert/model_digest.h"
+#include "krot/convert/certificate_file.h"
 
 #include <algorithm>
 #include <array>
@@ -148,8 +148,7 @@ using Observations =
 Observations SortedObservations(const Model& model) {
   Observations observations;
   for (const Point3D& point : model.points3D) {
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      const TrackElement& element = model.track_elements[e];
+    for (const TrackElement& element : TrackOf(model, point)) {
       observations[element.image_id].emplace_back(element.point2D_idx,
                                                   point.id);
     }

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <unordered_map>
 
@@ -108,8 +107,8 @@ class PositionAdder {
   // Sorts observations by point again.
   void Sort() {
     if (frame_ < 0) return;
-    std::vector<size_t> order(problem_.observations.size());
-    std::iota(order.begin(), order.end(), 0);
+    auto order =
+        NumbersUpTo<size_t>(static_cast<int64_t>(problem_.observations.size()));
     std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
       return problem_.observations[a].point < problem_.observations[b].point;
     });
@@ -318,18 +317,9 @@ double Reprojection::Error(const Estimate& estimate, Norm norm,
 double Reprojection::TrueCost(const Estimate& estimate, Norm norm,
                               int num_threads) const {
   const auto count = static_cast<int64_t>(built_.problem.observations.size());
-  std::vector<double> largest(NumChunks(count, kItemsPerChunk), 0);
-  ParallelFor(count, kItemsPerChunk, num_threads,
-              [&](int64_t begin, int64_t end, int) {
-                double& cost = largest[begin / kItemsPerChunk];
-                for (int64_t i = begin; i < end; ++i) {
-                  if (!built_.HasPixel(i)) continue;
-                  cost = std::max(cost, Error(estimate, norm, i));
-                }
-              });
-  double cost = 0;
-  for (const double chunk : largest) cost = std::max(cost, chunk);
-  return cost;
+  return ParallelMax(count, num_threads, [&](int64_t i) {
+    return built_.HasPixel(i) ? Error(estimate, norm, i) : 0;
+  });
 }
 
 double Reprojection::LevelledCost(const Estimate& estimate, Norm norm,

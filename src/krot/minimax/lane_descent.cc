@@ -1,7 +1,5 @@
 #include "krot/minimax/kernels.h"
 
-#include <cmath>
-
 #include "krot/minimax/lane_model.h"
 
 namespace krot::internal::KROT_UNITS {

@@ -95,8 +95,8 @@ std::string DescribeUnclaimed(const Image& image, uint32_t point2D_idx,
 void DropUnconfirmedNames(Model* model) {
   Claims claims(*model);
   for (const Point3D& point : model->points3D) {
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      claims.Take(point, model->track_elements[e]);
+    for (const TrackElement& element : TrackOf(*model, point)) {
+      claims.Take(point, element);
     }
   }
   claims.ForEachUnclaimed([&](size_t n, uint32_t i) {
@@ -108,8 +108,7 @@ void DropUnconfirmedNames(Model* model) {
 void NameByTracks(Model* model) {
   const IdIndex<ImageId> images(model->images);
   for (const Point3D& point : model->points3D) {
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      const TrackElement& element = model->track_elements[e];
+    for (const TrackElement& element : TrackOf(*model, point)) {
       const std::optional<int32_t> n = images.Find(element.image_id);
       if (!n) continue;
       std::vector<Point2D>& points2D = model->images[*n].points2D;
@@ -147,8 +146,7 @@ Contradictions FindContradictions(const Model& model) {
   Claims claims(model);
   Contradictions found;
   for (const Point3D& point : model.points3D) {
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      const TrackElement& element = model.track_elements[e];
+    for (const TrackElement& element : TrackOf(model, point)) {
       const Claim claim = claims.Take(point, element);
       if (claim == Claim::kConfirmed) continue;
       if (!found.Any()) {
@@ -186,9 +184,8 @@ void Follow(Reading reading, Model* model) {
   Claims claims(*model);
   std::vector<char> is_kept;
   for (const Point3D& point : model->points3D) {
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      is_kept.push_back(claims.Take(point, model->track_elements[e]) ==
-                        Claim::kConfirmed);
+    for (const TrackElement& element : TrackOf(*model, point)) {
+      is_kept.push_back(claims.Take(point, element) == Claim::kConfirmed);
     }
   }
   std::vector<std::vector<TrackElement>> missing(model->points3D.size());

@@ -10,6 +10,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "krot/base/numbers.h"
 #include "krot/model/sqlite_rows.h"
 
 namespace krot {
@@ -188,8 +189,7 @@ void AddMatches(VerifiedPair from, VerifiedPair* to) {
   }
   auto& matches = to->matches;
   matches.insert(matches.end(), from.matches.begin(), from.matches.end());
-  std::sort(matches.begin(), matches.end());
-  matches.erase(std::unique(matches.begin(), matches.end()), matches.end());
+  SortUnique(&matches);
 }
 
 void ReadPairs(const Model& model, const ImageOfId& join,

@@ -16,6 +16,9 @@ namespace krot::internal {
 // points).
 std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count);
 
+// The model's cameras, rigs, frames and images, without 2D points and tracks.
+Model WithoutPoints(const Model& model);
+
 // A model with some of the points: with their tracks and the 2D points that
 // these name, and with everything else of the whole model.
 struct ModelShare {

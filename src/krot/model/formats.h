@@ -1,14 +1,12 @@
 #pragma once
 
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include "krot/base/numbers.h"
 #include "krot/context.h"

@@ -3,7 +3,6 @@
 #include <cerrno>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <system_error>
 #include <vector>
 

@@ -10,7 +10,7 @@
 
 #include "krot/model.h"
 #include "krot/model/formats.h"
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {

@@ -13,6 +13,7 @@
 
 #include "krot/base/numbers.h"
 #include "krot/geometry/transform.h"
+#include "krot/model/rigs.h"
 #include "krot/model/sqlite_rows.h"
 
 namespace krot::internal {
@@ -40,10 +41,7 @@ std::optional<Matrix> MatrixOf(std::string_view blob) {
 }
 
 std::vector<PosePrior> ReadRows(SqliteDatabase* database, const Model& model) {
-  std::unordered_map<std::string, int32_t> image_of_name;
-  for (size_t n = 0; n < model.images.size(); ++n) {
-    image_of_name.emplace(model.images[n].name, static_cast<int32_t>(n));
-  }
+  const auto image_of_name = ImagesByName(model);
   std::unordered_map<int64_t, int32_t> image_of_id;
   SqliteRows images(database, "images", "image_id, name");
   while (images.Next()) {

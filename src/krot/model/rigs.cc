@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "krot/camera/camera_model.h"
 #include "krot/model.h"
 
 namespace krot::internal {
@@ -49,6 +50,17 @@ std::vector<ImageGeometry> ImageGeometries(const Model& model) {
   return images;
 }
 
+std::optional<PixelRay> RayOf(const Camera& camera,
+                              const Eigen::Vector2d& pixel) {
+  const auto undistorted =
+      UndistortPixel(camera.model_id, camera.params.data(), pixel);
+  if (!undistorted) return std::nullopt;
+  PixelRay ray;
+  ray.ray = undistorted->u.homogeneous();
+  ray.by_pixel << undistorted->J.inverse(), 0, 0;
+  return ray;
+}
+
 std::optional<SensorPlace> FindSensor(const Rig& rig,
                                       const SensorId& sensor_id) {
   if (rig.ref_sensor_id && *rig.ref_sensor_id == sensor_id) {
@@ -68,6 +80,24 @@ std::unordered_map<ImageId, int32_t> ImageIndices(const Model& model) {
     indices.emplace(model.images[n].id, static_cast<int32_t>(n));
   }
   return indices;
+}
+
+std::unordered_map<std::string_view, int32_t> ImagesByName(const Model& model) {
+  std::unordered_map<std::string_view, int32_t> indices;
+  for (size_t n = 0; n < model.images.size(); ++n) {
+    indices.emplace(model.images[n].name, static_cast<int32_t>(n));
+  }
+  return indices;
+}
+
+std::vector<int32_t> ImagesOfElements(const Model& model) {
+  const auto indices = ImageIndices(model);
+  std::vector<int32_t> images;
+  images.reserve(model.track_elements.size());
+  for (const TrackElement& element : model.track_elements) {
+    images.push_back(indices.at(element.image_id));
+  }
+  return images;
 }
 
 namespace {

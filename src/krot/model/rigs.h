@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/geometry.h"
 #include "krot/model.h"
 
@@ -113,6 +114,22 @@ struct ImageGeometry {
 // model (ValidateModel). O(images + frames).
 std::vector<ImageGeometry> ImageGeometries(const Model& model);
 
+// A pixel's ray, and its derivatives by the pixel's two coordinates.
+struct PixelRay {
+  Eigen::Vector3d ray;
+  Eigen::Matrix<double, 3, 2> by_pixel;
+};
+
+inline PixelRay operator*(const Eigen::Matrix3d& rotation,
+                          const PixelRay& pixel) {
+  return {rotation * pixel.ray, rotation * pixel.by_pixel};
+}
+
+// The ray of a pixel in camera axes; none if no ray less than 90 degrees off
+// the axis projects to the pixel, and for cameras without an image plane.
+std::optional<PixelRay> RayOf(const Camera& camera,
+                              const Eigen::Vector2d& pixel);
+
 // The pose of a sensor in its rig.
 struct SensorPlace {
   int32_t index = -1;                   // as ImageGeometry::sensor
@@ -125,6 +142,38 @@ std::optional<SensorPlace> FindSensor(const Rig& rig,
 
 // Index in Model::images by id.
 std::unordered_map<ImageId, int32_t> ImageIndices(const Model& model);
+
+// The same by name; of images that share a name the first one counts. The names
+// are the model's own.
+std::unordered_map<std::string_view, int32_t> ImagesByName(const Model& model);
+
+// For each track element the index of its image.
+std::vector<int32_t> ImagesOfElements(const Model& model);
+
+// The track of one of the model's points.
+struct Track {
+  const TrackElement* first;
+  const TrackElement* last;
+
+  const TrackElement* begin() const { return first; }
+  const TrackElement* end() const { return last; }
+};
+inline Track TrackOf(const Model& model, const Point3D& point) {
+  const TrackElement* const all = model.track_elements.data();
+  return {all + point.track_begin, all + point.track_end};
+}
+
+// Indices of the records in the order of their ids, which must be unique.
+// Results that are computed in this order do not depend on the order in the
+// file.
+template <typename Record>
+std::vector<int32_t> OrderOfIds(const std::vector<Record>& records) {
+  auto order = NumbersUpTo<int32_t>(static_cast<int64_t>(records.size()));
+  std::sort(order.begin(), order.end(), [&](int32_t a, int32_t b) {
+    return records[a].id < records[b].id;
+  });
+  return order;
+}
 
 // The names of the sensor types -1, 0 and 1 in text files: INVALID, CAMERA,
 // IMU. None for other types and names.

@@ -1,10 +1,8 @@
 #include "krot/model/model_io.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <Eigen/Geometry>

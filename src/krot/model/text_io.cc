@@ -175,42 +175,42 @@ Point3D ReadPoint3D(TextReader* reader,
   return point;
 }
 
+template <typename Record, typename Read>
+void ReadRecords(const FileBytes& file, const Read& read,
+                 std::vector<Record>* records) {
+  records->clear();
+  TextReader reader(file);
+  while (reader.NextRecord()) records->push_back(read(&reader));
+}
+
 }  // namespace
 
 void ParseCamerasText(const FileBytes& file, Model* model) {
-  model->cameras.clear();
-  TextReader reader(file);
-  while (reader.NextRecord()) model->cameras.push_back(ReadCamera(&reader));
+  ReadRecords(file, &ReadCamera, &model->cameras);
 }
 
 void ParseRigsText(const FileBytes& file, Model* model) {
-  model->rigs.clear();
-  TextReader reader(file);
-  while (reader.NextRecord()) model->rigs.push_back(ReadRig(&reader));
+  ReadRecords(file, &ReadRig, &model->rigs);
 }
 
 void ParseFramesText(const FileBytes& file, Model* model) {
-  model->frames.clear();
-  TextReader reader(file);
-  while (reader.NextRecord()) model->frames.push_back(ReadFrame(&reader));
+  ReadRecords(file, &ReadFrame, &model->frames);
 }
 
 void ParseImagesText(const FileBytes& file, Model* model) {
-  model->images.clear();
   std::vector<Point2D> points2D;
-  TextReader reader(file);
-  while (reader.NextRecord()) {
-    model->images.push_back(ReadImage(&reader, &points2D));
-  }
+  const auto read = [&](TextReader* reader) {
+    return ReadImage(reader, &points2D);
+  };
+  ReadRecords(file, read, &model->images);
 }
 
 void ParsePoints3DText(const FileBytes& file, Model* model) {
-  model->points3D.clear();
   model->track_elements.clear();
-  TextReader reader(file);
-  while (reader.NextRecord()) {
-    model->points3D.push_back(ReadPoint3D(&reader, &model->track_elements));
-  }
+  const auto read = [&](TextReader* reader) {
+    return ReadPoint3D(reader, &model->track_elements);
+  };
+  ReadRecords(file, read, &model->points3D);
 }
 
 namespace {
@@ -366,9 +366,9 @@ std::string FormatPoints3DText(const Model& model) {
     for (const double value : point.xyz) AppendWord(value, &text);
     for (const uint8_t channel : point.color) AppendWord(channel, &text);
     AppendWord(point.error, &text);
-    for (uint64_t i = point.track_begin; i < point.track_end; ++i) {
-      AppendWord(model.track_elements[i].image_id, &text);
-      AppendWord(model.track_elements[i].point2D_idx, &text);
+    for (const TrackElement& element : TrackOf(model, point)) {
+      AppendWord(element.image_id, &text);
+      AppendWord(element.point2D_idx, &text);
     }
     text.push_back('\n');
   }

@@ -182,6 +182,11 @@ void OptionTable::Refuse(const std::string& name,
   throw OptionError("--" + name + " has no effect " + why);
 }
 
+void OptionTable::RefuseAll(const std::vector<std::string>& names,
+                            const std::string& why) const {
+  for (const std::string& name : names) Refuse(name, why);
+}
+
 void OptionTable::Assign(const std::vector<OptionAssignment>& assignments) {
   std::set<std::string> names;
   for (const OptionAssignment& assignment : assignments) {

@@ -155,6 +155,8 @@ class OptionTable {
 
   // Throws OptionError if the option was given: it "has no effect `why`".
   void Refuse(const std::string& name, const std::string& why) const;
+  void RefuseAll(const std::vector<std::string>& names,
+                 const std::string& why) const;
 
   // Every option with its range and default; 80 columns.
   std::string Help() const;

@@ -153,18 +153,16 @@ void CheckFinishLoss(const SolveModelOptions& options,
 void CheckFinishOptions(const SolveModelOptions& options,
                         const OptionTable& table) {
   const bool has_least_squares = options.finish.finish == Finish::kLeastSquares;
-  for (const char* name : {"Solver.finish_slack", "Solver.finish_loss",
-                           "Solver.finish_loss_scale"}) {
-    if (!has_least_squares) {
-      table.Refuse(name, "without --Solver.finish least_squares");
-    }
+  if (!has_least_squares) {
+    table.RefuseAll({"Solver.finish_slack", "Solver.finish_loss",
+                     "Solver.finish_loss_scale"},
+                    "without --Solver.finish least_squares");
   }
   CheckFinishLoss(options, table);
   if (EffectiveMethod(options) == SolveMethod::kAuto) return;
-  for (const char* name : {"Solver.finish", "Solver.finish_slack",
-                           "Solver.finish_loss", "Solver.finish_loss_scale"}) {
-    table.Refuse(name, "but with --Solver.method auto");
-  }
+  table.RefuseAll({"Solver.finish", "Solver.finish_slack", "Solver.finish_loss",
+                   "Solver.finish_loss_scale"},
+                  "but with --Solver.method auto");
 }
 
 namespace {
@@ -240,10 +238,9 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
     table.Refuse("Solver.finish_slack", why);
     table.Refuse("Problem.init_max_error",
                  "with --Solver.max_error, which needs no such start");
-    for (const char* name : {"fixed_images_path", "fixed_points_path",
-                             "positions_path", "point_positions_path"}) {
-      table.Refuse(name, "with --Solver.max_error, which moves everything");
-    }
+    table.RefuseAll({"fixed_images_path", "fixed_points_path", "positions_path",
+                     "point_positions_path"},
+                    "with --Solver.max_error, which moves everything");
   } else {
     table.Refuse("conflicts_path", "without --Solver.max_error");
   }
@@ -268,11 +265,9 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
   }
   if (options.norm.p != 2 || method == SolveMethod::kResInt ||
       options.polish != Polish::kNone) {
-    for (const char* name : {"positions_path", "point_positions_path",
-                             "Problem.inflate_positions"}) {
-      table.Refuse(name,
-                   "but with --Solver.norm 2, the joint solver, and no polish");
-    }
+    table.RefuseAll(
+        {"positions_path", "point_positions_path", "Problem.inflate_positions"},
+        "but with --Solver.norm 2, the joint solver, and no polish");
   }
   if (method == SolveMethod::kResInt) {
     const char* why =
@@ -283,10 +278,9 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
     table.Refuse("certificate_path", why);
   }
   if (method == SolveMethod::kJoint) {
-    for (const char* name : {"ResInt.max_sweeps", "ResInt.sweep_tolerance",
-                             "Solver.settings", "FastDescent.max_iterations"}) {
-      table.Refuse(name, "with --Solver.method joint, which makes no sweeps");
-    }
+    table.RefuseAll({"ResInt.max_sweeps", "ResInt.sweep_tolerance",
+                     "Solver.settings", "FastDescent.max_iterations"},
+                    "with --Solver.method joint, which makes no sweeps");
   }
   if (method != SolveMethod::kAuto && options.init == SolveInit::kModel) {
     table.Refuse("Problem.init_max_error", "without --Solver.init feasible");

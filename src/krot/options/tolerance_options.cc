@@ -44,10 +44,9 @@ void ResolveOutlierFilterOptions(const OptionTable& table, bool makes_profile,
     options->method = OutlierMethod::kSnooping;
   }
   if (options->method == OutlierMethod::kSnooping) {
-    for (const char* name : {"OutlierFilter.max_error", "Solver.relative_gap",
-                             "Problem.same_image"}) {
-      table.Refuse(name, "with --OutlierFilter.method snooping");
-    }
+    table.RefuseAll({"OutlierFilter.max_error", "Solver.relative_gap",
+                     "Problem.same_image"},
+                    "with --OutlierFilter.method snooping");
   }
   if (options->method == OutlierMethod::kThreshold && !options->max_error) {
     throw OptionError(

@@ -1,4 +1,4 @@
-#include "krot/outliers/packing.h"
+#include "krot/outliers/conflict.h"
 
 #include <algorithm>
 #include <array>
@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "krot/base/numbers.h"
 #include "krot/outliers/parts.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/cost.h"
@@ -335,9 +336,7 @@ std::vector<std::vector<int64_t>> TwoViewConflicts::Candidates(
       if (edge.slack < 0) AppendTriples(edge, planes, worth[j], &candidates);
     }
   }
-  std::stable_sort(
-      candidates.begin(), candidates.end(),
-      [](const Candidate& a, const Candidate& b) { return a.ease > b.ease; });
+  SortLargestFirst(&candidates, &Candidate::ease);
   std::vector<std::vector<int64_t>> sets;
   for (Candidate& candidate : candidates) {
     if (sets.size() == 4) break;

@@ -8,7 +8,6 @@
 #include "krot/base/context.h"
 #include "krot/model/derived_models.h"
 #include "krot/outliers/conflict.h"
-#include "krot/outliers/packing.h"
 #include "krot/outliers/parts.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/robust_start.h"

@@ -1,4 +1,4 @@
-#include "krot/outliers/packing.h"
+#include "krot/outliers/conflict.h"
 
 #include <algorithm>
 #include <numeric>

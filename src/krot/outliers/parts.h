@@ -10,18 +10,13 @@
 #include <Eigen/Core>
 
 #include "krot/base/context.h"
+#include "krot/base/numbers.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {
 
 // Leaves each value once, ascending.
-template <typename Value>
-void SortUnique(std::vector<Value>* values) {
-  std::sort(values->begin(), values->end());
-  values->erase(std::unique(values->begin(), values->end()), values->end());
-}
-
 // Calls body(a, b) for about `num_tried` of the pairs a < b of [0, count),
 // spread evenly, those that are farthest apart first.
 template <typename Body>

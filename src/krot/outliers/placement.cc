@@ -84,9 +84,7 @@ double MedianDepthOfOthers(const KnownRotationProblem& problem,
 }  // namespace
 
 std::vector<int32_t> AllPoints(const KnownRotationProblem& problem) {
-  std::vector<int32_t> all(problem.num_points);
-  std::iota(all.begin(), all.end(), 0);
-  return all;
+  return NumbersUpTo<int32_t>(problem.num_points);
 }
 
 Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i) {
@@ -117,10 +115,9 @@ void PlacePointsRobustly(const KnownRotationProblem& problem,
     };
     estimate->points[k] = RobustPlace(rays, cap, error).Find(depth);
   };
-  ParallelFor(static_cast<int64_t>(points.size()), /*chunk_size=*/64,
-              context.num_threads, [&](int64_t begin, int64_t end, int) {
-                for (int64_t n = begin; n < end; ++n) place(points[n]);
-              });
+  ParallelForEach(
+      static_cast<int64_t>(points.size()), context.num_threads,
+      [&](int64_t n) { place(points[n]); }, /*chunk_size=*/64);
 }
 
 void PlaceFramesRobustly(const KnownRotationProblem& problem,
@@ -154,9 +151,9 @@ void PlaceFramesRobustly(const KnownRotationProblem& problem,
     estimate->translations[f] =
         -rig_from_world[f] * RobustPlace(rays, cap, error).Find(1);
   };
-  ParallelFor(static_cast<int64_t>(frames.size()), /*chunk_size=*/1,
-              context.num_threads,
-              [&](int64_t n, int64_t, int) { place(frames[n]); });
+  ParallelForEach(
+      static_cast<int64_t>(frames.size()), context.num_threads,
+      [&](int64_t n) { place(frames[n]); }, /*chunk_size=*/1);
 }
 
 }  // namespace krot::internal

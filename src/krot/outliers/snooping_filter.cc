@@ -14,7 +14,6 @@
 #include "krot/convert/reprojection.h"
 #include "krot/model/derived_models.h"
 #include "krot/outliers/conflict.h"
-#include "krot/outliers/packing.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"
 

@@ -33,11 +33,9 @@ class Counts {
       suspect.num_conflicts = static_cast<int64_t>(conflicts_[id].size());
       if (suspect.num_removed > 0) ranked.push_back(std::move(suspect));
     }
-    std::stable_sort(ranked.begin(), ranked.end(),
-                     [](const Suspect& a, const Suspect& b) {
-                       return std::make_pair(a.num_removed, a.num_conflicts) >
-                              std::make_pair(b.num_removed, b.num_conflicts);
-                     });
+    SortLargestFirst(&ranked, [](const Suspect& suspect) {
+      return std::make_pair(suspect.num_removed, suspect.num_conflicts);
+    });
     return ranked;
   }
 
@@ -119,11 +117,7 @@ std::vector<RemovedObservation> ListRemoved(
   const auto key = [](const RemovedObservation& o) {
     return std::isnan(o.error_before_px) ? kInfinity : o.error_before_px;
   };
-  std::stable_sort(
-      list.begin(), list.end(),
-      [&](const RemovedObservation& a, const RemovedObservation& b) {
-        return key(a) > key(b);
-      });
+  SortLargestFirst(&list, key);
   return list;
 }
 

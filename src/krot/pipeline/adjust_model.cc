@@ -10,7 +10,7 @@
 #include "krot/base/numbers.h"
 #include "krot/check.h"
 #include "krot/model/derived_models.h"
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 
 namespace krot::internal {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <system_error>
 
-#include "krot/convert/model_digest.h"
+#include "krot/convert/certificate_file.h"
 
 namespace krot::internal {
 namespace {

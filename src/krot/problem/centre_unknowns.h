@@ -11,6 +11,24 @@
 
 namespace krot::internal {
 
+// Centres closer than this, relative to the size of their coordinates and of
+// the component, coincide: rounding is a thousand times smaller.
+inline constexpr double kCoincident = 1e-12;
+
+// The projection centre of a frame: that of its first view with an observation.
+struct FrameGeometry {
+  Eigen::Matrix3d world_from_rig = Eigen::Matrix3d::Identity();  // R_rw'
+  Eigen::Vector3d centre_in_rig = Eigen::Vector3d::Zero();       // -R_sr' t_sr
+  int num_views = 0;                                             // its weight
+  bool is_seen_through = false;  // it has an observation
+  bool has_two_centres = false;  // its observations fix the scale
+};
+
+// Describes every frame; from the observations of all ranks where ranks share
+// the points. O(observations).
+std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem,
+                                          const Context& context);
+
 // The unknowns of the linear systems of the known rotation problem: the points
 // s_k and the frames' centres in the world, C_f = -R_rw' t_f. As
 //

@@ -10,20 +10,6 @@
 
 namespace krot::internal {
 
-// The projection centre of a frame: that of its first view with an observation.
-struct FrameGeometry {
-  Eigen::Matrix3d world_from_rig = Eigen::Matrix3d::Identity();  // R_rw'
-  Eigen::Vector3d centre_in_rig = Eigen::Vector3d::Zero();       // -R_sr' t_sr
-  int num_views = 0;                                             // its weight
-  bool is_seen_through = false;  // it has an observation
-  bool has_two_centres = false;  // its observations fix the scale
-};
-
-// Describes every frame; from the observations of all ranks where ranks share
-// the points. O(observations).
-std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem,
-                                          const Context& context);
-
 // The freedom that the known rotation problem leaves: every connected
 // component may be translated and, unless a baseline fixes its size, scaled
 // about any point.

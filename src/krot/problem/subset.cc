@@ -1,12 +1,12 @@
 #include "krot/problem/subset.h"
 
 #include <algorithm>
-#include <numeric>
 #include <string>
 #include <utility>
 
 #include "krot/base/check.h"
 #include "krot/base/disjoint_sets.h"
+#include "krot/base/numbers.h"
 
 namespace krot::internal {
 namespace {
@@ -315,9 +315,8 @@ Components FindComponentsOf(const KnownRotationProblem& problem,
 }
 
 std::vector<int64_t> All(const KnownRotationProblem& problem) {
-  std::vector<int64_t> all(problem.observations.size());
-  std::iota(all.begin(), all.end(), 0);
-  return all;
+  return NumbersUpTo<int64_t>(
+      static_cast<int64_t>(problem.observations.size()));
 }
 
 }  // namespace

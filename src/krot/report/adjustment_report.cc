@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <sstream>
 #include <vector>
 
@@ -15,15 +14,14 @@ namespace {
 
 Json AdjustmentIterationsJson(
     const std::vector<BundleAdjustmentIteration>& iterations) {
-  Json array = Json::array();
-  for (const BundleAdjustmentIteration& iteration : iterations) {
-    array.push_back({{"cost", iteration.cost},
-                     {"is_successful", iteration.is_successful},
-                     {"barrier", NumberOrNull(iteration.barrier)},
-                     {"cap", NumberOrNull(iteration.cap)},
-                     {"seconds", iteration.seconds}});
-  }
-  return array;
+  return ListJson(iterations,
+                  [&](const BundleAdjustmentIteration& iteration) -> Json {
+                    return {{"cost", iteration.cost},
+                            {"is_successful", iteration.is_successful},
+                            {"barrier", NumberOrNull(iteration.barrier)},
+                            {"cap", NumberOrNull(iteration.cap)},
+                            {"seconds", iteration.seconds}};
+                  });
 }
 
 std::string AdjustmentErrorTable(const AdjustModelSummary& summary) {

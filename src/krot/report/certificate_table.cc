@@ -146,14 +146,13 @@ std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
   }
   Json of_baselines;
   if (baselines) {
-    Json pairs = Json::array();
-    for (const BaselineCertificate::Pair& pair : baselines->pairs) {
-      pairs.push_back({{"image_id1", pair.image_id1},
-                       {"image_id2", pair.image_id2},
-                       {"num_matches", pair.num_matches},
-                       {"num_explained", pair.num_explained},
-                       {"most_explained", pair.most_explained}});
-    }
+    Json pairs = ListJson(baselines->pairs, [&](const auto& pair) -> Json {
+      return {{"image_id1", pair.image_id1},
+              {"image_id2", pair.image_id2},
+              {"num_matches", pair.num_matches},
+              {"num_explained", pair.num_explained},
+              {"most_explained", pair.most_explained}};
+    });
     of_baselines = {{"tolerance_px", baselines->tolerance_px},
                     {"pairs", pairs}};
   }

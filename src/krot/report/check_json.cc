@@ -70,25 +70,24 @@ Json ExplanationJson(const Explanation& explanation, const PairCheck& check) {
 }  // namespace
 
 Json PairJson(const PairCheck& check) {
-  Json images = Json::array();
-  for (const CheckedImage& image : check.images) {
-    images.push_back(
-        {{"image_id", image.image_id},
-         {"image_name", image.name},
-         {"num_kept_pairs", image.num_kept},
-         {"num_contradictory_pairs", image.num_contradictory},
-         {"num_undecided_pairs", image.num_undecided},
-         {"kept_matches", image.kept_matches},
-         {"contradictory_matches", image.contradictory_matches},
-         {"is_wrong", image.is_wrong},
-         {"fault", image.is_wrong ? Json(PoseFaultName(image.fault)) : Json()},
-         {"num_matches", image.num_matches},
-         {"num_agreeing_moved", image.num_agreeing_moved},
-         {"num_agreeing_turned", image.num_agreeing_turned},
-         {"moved_by", image.moved_by},
-         {"turned_by_deg", image.turned_by_deg},
-         {"is_rotation_proved_wrong", image.is_rotation_proved_wrong}});
-  }
+  Json images = ListJson(check.images, [&](const CheckedImage& image) -> Json {
+    return {
+        {"image_id", image.image_id},
+        {"image_name", image.name},
+        {"num_kept_pairs", image.num_kept},
+        {"num_contradictory_pairs", image.num_contradictory},
+        {"num_undecided_pairs", image.num_undecided},
+        {"kept_matches", image.kept_matches},
+        {"contradictory_matches", image.contradictory_matches},
+        {"is_wrong", image.is_wrong},
+        {"fault", image.is_wrong ? Json(PoseFaultName(image.fault)) : Json()},
+        {"num_matches", image.num_matches},
+        {"num_agreeing_moved", image.num_agreeing_moved},
+        {"num_agreeing_turned", image.num_agreeing_turned},
+        {"moved_by", image.moved_by},
+        {"turned_by_deg", image.turned_by_deg},
+        {"is_rotation_proved_wrong", image.is_rotation_proved_wrong}};
+  });
   Json pairs = Json::array();
   for (const CheckedPair& pair : check.pairs) {
     const bool is_contradictory = pair.state == PairState::kContradictory;
@@ -129,27 +128,21 @@ Json PairJson(const PairCheck& check) {
 
 std::string CheckJson(const CheckReport& report) {
   const ModelCheck& check = report.check;
-  Json images = Json::array();
-  for (const ImageCheck& image : check.images) {
-    images.push_back(ImageJson(check, image));
-  }
-  Json observations = Json::array();
-  for (const WrongObservation& one : check.observations) {
-    observations.push_back({{"image_id", one.image_id},
-                            {"image_name", one.image_name},
-                            {"point2D_idx", one.point2D_idx},
-                            {"point3D_id", one.point3D_id},
-                            {"w", FiniteOrNull(one.w)},
-                            {"error_px", FiniteOrNull(one.error_px)},
-                            {"is_of_two", one.is_of_two}});
-  }
-  Json tracks = Json::array();
-  for (const TwoPointTrack& track : check.tracks) {
-    tracks.push_back({{"point3D_id", track.point3D_id},
-                      {"num_first", track.num_first},
-                      {"num_second", track.num_second},
-                      {"second", VectorJson(track.second)}});
-  }
+  Json images = ListJson(check.images, [&](const ImageCheck& image) -> Json {
+    return ImageJson(check, image);
+  });
+  Json observations =
+      ListJson(check.observations, [&](const WrongObservation& one) -> Json {
+        return ObservationJson(one, {{"w", FiniteOrNull(one.w)},
+                                     {"error_px", FiniteOrNull(one.error_px)},
+                                     {"is_of_two", one.is_of_two}});
+      });
+  Json tracks = ListJson(check.tracks, [&](const TwoPointTrack& track) -> Json {
+    return {{"point3D_id", track.point3D_id},
+            {"num_first", track.num_first},
+            {"num_second", track.num_second},
+            {"second", VectorJson(track.second)}};
+  });
   const Json json = {
       {"version", report.run.version},
       {"command", "model_checker"},

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/report/pair_report.h"
 #include "krot/report/text_table.h"
 
@@ -28,13 +29,11 @@ std::vector<const ImageCheck*> ImagesOf(const ModelCheck& check,
   for (const ImageCheck& image : check.images) {
     if (image.verdict == verdict) images.push_back(&image);
   }
-  std::stable_sort(images.begin(), images.end(),
-                   [&](const ImageCheck* a, const ImageCheck* b) {
-                     return verdict == ImageVerdict::kWeaklyHeld
-                                ? a->relative_center_sigma >
-                                      b->relative_center_sigma
-                                : a->num_wrong > b->num_wrong;
-                   });
+  if (verdict == ImageVerdict::kWeaklyHeld) {
+    SortLargestFirst(&images, &ImageCheck::relative_center_sigma);
+  } else {
+    SortLargestFirst(&images, &ImageCheck::num_wrong);
+  }
   return images;
 }
 

@@ -2,10 +2,10 @@
 #include <cmath>
 #include <functional>
 #include <iomanip>
-#include <limits>
 #include <sstream>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/report/report_json.h"
 #include "krot/report/reports.h"
 #include "krot/report/text_table.h"
@@ -120,19 +120,15 @@ std::string ImageTable(
   for (const ImageDifference& image : summary.images) {
     if (key(image) > 0) images.push_back(&image);
   }
-  std::stable_sort(images.begin(), images.end(),
-                   [&key](const ImageDifference* a, const ImageDifference* b) {
-                     return key(*a) > key(*b);
-                   });
+  SortLargestFirst(&images, [&](const auto* image) { return key(*image); });
   images.resize(std::min(images.size(), max_rows));
   if (images.empty()) return "";
   TextTable table;
   table.AddRow({"image", "degrees", "centre", "% of the radius", "max 1, px",
                 "max 2, px"});
   for (const ImageDifference* image : images) {
-    const double kUnknown = std::numeric_limits<double>::quiet_NaN();
     const PoseDifference pose =
-        image->pose.value_or(PoseDifference{kUnknown, kUnknown});
+        image->pose.value_or(PoseDifference{kNaN, kNaN});
     table.AddRow({image->image_name, FormatAngle(pose.rotation_deg),
                   FormatLength(pose.center),
                   FormatShare(pose.center, summary.scene_radius),
@@ -231,29 +227,25 @@ Json DifferenceJson(const DifferenceStatistics& differences) {
 }
 
 Json SharedImagesJson(const std::vector<ImageDifference>& images) {
-  Json json = Json::array();
-  for (const ImageDifference& image : images) {
-    json.push_back(
-        {{"image_name", image.image_name},
-         {"image_id1", image.image_id1},
-         {"image_id2", image.image_id2},
-         {"rotation_deg", image.pose ? Json(image.pose->rotation_deg) : Json()},
-         {"center", image.pose ? Json(image.pose->center) : Json()},
-         {"pixel_error",
-          {{"model1", CountedErrorJson(image.errors1)},
-           {"model2", CountedErrorJson(image.errors2)}}}});
-  }
-  return json;
+  return ListJson(images, [&](const ImageDifference& image) -> Json {
+    return {
+        {"image_name", image.image_name},
+        {"image_id1", image.image_id1},
+        {"image_id2", image.image_id2},
+        {"rotation_deg", image.pose ? Json(image.pose->rotation_deg) : Json()},
+        {"center", image.pose ? Json(image.pose->center) : Json()},
+        {"pixel_error",
+         {{"model1", CountedErrorJson(image.errors1)},
+          {"model2", CountedErrorJson(image.errors2)}}}};
+  });
 }
 
 Json WorstPointsJson(const std::vector<PointDifference>& points) {
-  Json json = Json::array();
-  for (const PointDifference& point : points) {
-    json.push_back({{"point3D_id1", point.point3D_id1},
-                    {"point3D_id2", point.point3D_id2},
-                    {"distance", point.distance}});
-  }
-  return json;
+  return ListJson(points, [&](const PointDifference& point) -> Json {
+    return {{"point3D_id1", point.point3D_id1},
+            {"point3D_id2", point.point3D_id2},
+            {"distance", point.distance}};
+  });
 }
 
 }  // namespace

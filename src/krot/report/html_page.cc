@@ -6,7 +6,6 @@
 #include <functional>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <string_view>
 #include <unordered_map>
 
@@ -14,6 +13,7 @@
 
 #include "krot/analysis/model_statistics.h"
 #include "krot/base/check.h"
+#include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
@@ -214,15 +214,13 @@ std::vector<int64_t> SelectPoints(const std::vector<float>& max_errors,
                                   int64_t max_count) {
   CheckArgument(max_count >= 1, "max_count", max_count, ">= 1");
   const auto num_points = static_cast<int64_t>(max_errors.size());
-  std::vector<int64_t> order(num_points);
-  std::iota(order.begin(), order.end(), int64_t{0});
+  auto order = NumbersUpTo<int64_t>(num_points);
   if (num_points <= max_count) return order;
 
   const auto height = [&max_errors](int64_t index) {
     return std::isnan(max_errors[index]) ? -1.0f : max_errors[index];
   };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](int64_t a, int64_t b) { return height(a) > height(b); });
+  SortLargestFirst(&order, height);
   const int64_t num_worst = max_count / 100;
   std::sort(order.begin() + num_worst, order.end());
   const int64_t num_others = max_count - num_worst;

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -50,12 +49,12 @@ Json PositionFrameJson(const std::optional<PositionFrame>& position_frame,
                        bool is_written) {
   if (!position_frame) return nullptr;
   const PositionFrame& frame = *position_frame;
-  Json wrong = Json::array();
-  for (const WrongPosition& position : frame.wrong) {
-    wrong.push_back({{"name", position.name},
-                     {"distance", position.distance},
-                     {"radius", position.radius}});
-  }
+  Json wrong =
+      ListJson(frame.wrong, [&](const WrongPosition& position) -> Json {
+        return {{"name", position.name},
+                {"distance", position.distance},
+                {"radius", position.radius}};
+      });
   const Similarity& own_from_model = frame.own_from_model;
   return {
       {"scale", own_from_model.scale},
@@ -220,19 +219,19 @@ std::string AdjustedDistanceTable(const DistanceComparison& comparison) {
 Json AdjustedDistancesJson(
     const std::optional<DistanceComparison>& comparison) {
   if (!comparison) return nullptr;
-  Json list = Json::array();
-  for (const DistanceComparison::Distance& distance : comparison->distances) {
-    list.push_back(
-        {{"name", distance.name},
-         {"metres", NumberOrNull(distance.metres)},
-         {"tolerance", distance.metres ? Json(distance.tolerance) : Json()},
-         {"takes_part", distance.takes_part},
-         {"is_contradicted", distance.IsContradicted()},
-         {"after", FiniteOrNull(distance.length)},
-         {"sigma", FiniteOrNull(distance.sigma)},
-         {"redundancy", FiniteOrNull(distance.redundancy)},
-         {"w", FiniteOrNull(distance.w)}});
-  }
+  Json list =
+      ListJson(comparison->distances, [&](const auto& distance) -> Json {
+        return {
+            {"name", distance.name},
+            {"metres", NumberOrNull(distance.metres)},
+            {"tolerance", distance.metres ? Json(distance.tolerance) : Json()},
+            {"takes_part", distance.takes_part},
+            {"is_contradicted", distance.IsContradicted()},
+            {"after", FiniteOrNull(distance.length)},
+            {"sigma", FiniteOrNull(distance.sigma)},
+            {"redundancy", FiniteOrNull(distance.redundancy)},
+            {"w", FiniteOrNull(distance.w)}};
+      });
   return {{"metres_per_unit", NumberOrNull(comparison->metres_per_unit)},
           {"distances", std::move(list)}};
 }

@@ -5,6 +5,7 @@
 #include <set>
 #include <sstream>
 
+#include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
@@ -14,8 +15,8 @@ namespace {
 
 bool RepeatsAnImage(const Model& model, const Point3D& point) {
   std::set<ImageId> images;
-  for (uint64_t n = point.track_begin; n < point.track_end; ++n) {
-    if (!images.insert(model.track_elements[n].image_id).second) return true;
+  for (const TrackElement& element : TrackOf(model, point)) {
+    if (!images.insert(element.image_id).second) return true;
   }
   return false;
 }
@@ -28,9 +29,9 @@ NoiseFigures FiguresOf(const Model& model, const ModelNoise& noise) {
   figures.num_tested = noise.num_tested;
   figures.num_above = noise.num_above;
   figures.num_above_by_image.assign(model.images.size(), 0);
-  const auto image_of = ImageIndices(model);
-  for (size_t e = 0; e < model.track_elements.size(); ++e) {
-    figures.num_above_by_image[image_of.at(model.track_elements[e].image_id)] +=
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
+  for (size_t e = 0; e < image_of.size(); ++e) {
+    figures.num_above_by_image[image_of[e]] +=
         noise.observations[e].w > noise.critical_w;
   }
   std::vector<double> w;
@@ -111,10 +112,7 @@ template <typename Errors>
 std::string KeepWorst(const std::string& name, size_t max_rows,
                       std::vector<Errors>* all) {
   const size_t total = all->size();
-  std::stable_sort(all->begin(), all->end(),
-                   [](const Errors& a, const Errors& b) {
-                     return a.errors.max > b.errors.max;
-                   });
+  SortLargestFirst(all, [](const Errors& one) { return one.errors.max; });
   all->resize(std::min(total, max_rows));
   return "\nBy " + name + ", pixels" +
          (all->size() < total
@@ -305,33 +303,23 @@ Json ImageErrorsJson(const ModelReport& report) {
 }
 
 Json CamerasJson(const std::vector<CameraErrors>& cameras) {
-  Json json = Json::array();
-  for (const CameraErrors& camera : cameras) {
-    json.push_back({{"camera_id", camera.camera_id},
-                    {"num_images", camera.num_images},
-                    {"pixel_error", CountedErrorJson(camera.errors)}});
-  }
-  return json;
+  return ListJson(cameras, [&](const CameraErrors& camera) -> Json {
+    return {{"camera_id", camera.camera_id},
+            {"num_images", camera.num_images},
+            {"pixel_error", CountedErrorJson(camera.errors)}};
+  });
 }
 
 Json WorstJson(const std::vector<WorstObservation>& worst) {
-  Json json = Json::array();
-  for (const WorstObservation& observation : worst) {
-    json.push_back({{"image_id", observation.image_id},
-                    {"image_name", observation.image_name},
-                    {"point2D_idx", observation.point2D_idx},
-                    {"point3D_id", observation.point3D_id},
-                    {"error_px", observation.error_px}});
-  }
-  return json;
+  return ListJson(worst, [&](const WorstObservation& observation) -> Json {
+    return ObservationJson(observation, {{"error_px", observation.error_px}});
+  });
 }
 
 Json NoiseJson(const NoiseFigures& noise) {
-  Json quantiles = Json::array();
-  for (const NoiseFigures::Quantile& one : noise.quantiles) {
-    quantiles.push_back(
-        {{"share", one.share}, {"w", one.w}, {"gaussian_w", one.gaussian_w}});
-  }
+  Json quantiles = ListJson(noise.quantiles, [&](const auto& one) -> Json {
+    return {{"share", one.share}, {"w", one.w}, {"gaussian_w", one.gaussian_w}};
+  });
   const auto if_known = [&](double value) {
     return noise.sigma_px ? Json(value) : Json();
   };

@@ -1,6 +1,5 @@
 #include "krot/report/reports.h"
 
-#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <string>
@@ -14,18 +13,13 @@ namespace krot::internal {
 namespace {
 
 Json RemovedJson(const std::vector<RemovedObservation>& removed) {
-  Json json = Json::array();
-  for (const RemovedObservation& o : removed) {
-    json.push_back({{"image_id", o.image_id},
-                    {"image_name", o.image_name},
-                    {"point2D_idx", o.point2D_idx},
-                    {"point3D_id", o.point3D_id},
-                    {"error_before_px", FiniteOrNull(o.error_before_px)},
-                    {"error_after_px", FiniteOrNull(o.error_after_px)},
-                    {"conflict", NumberOrNull(o.conflict)},
-                    {"w", o.w ? FiniteOrNull(*o.w) : Json()}});
-  }
-  return json;
+  return ListJson(removed, [&](const RemovedObservation& o) -> Json {
+    return ObservationJson(
+        o, {{"error_before_px", FiniteOrNull(o.error_before_px)},
+            {"error_after_px", FiniteOrNull(o.error_after_px)},
+            {"conflict", NumberOrNull(o.conflict)},
+            {"w", o.w ? FiniteOrNull(*o.w) : Json()}});
+  });
 }
 
 // The share of conflicts that would vanish without this suspect.
@@ -37,17 +31,15 @@ Json ConflictShare(int64_t num_conflicts, const OutlierFilterSummary& summary) {
 
 Json SuspectsJson(const std::vector<Suspect>& suspects, const char* id,
                   const OutlierFilterSummary& summary) {
-  Json json = Json::array();
-  for (const Suspect& suspect : suspects) {
+  return ListJson(suspects, [&](const Suspect& suspect) -> Json {
     Json one = {{id, suspect.id}};
     if (!suspect.name.empty()) one["image_name"] = suspect.name;
     one["num_observations"] = suspect.num_observations;
     one["num_removed"] = suspect.num_removed;
     one["num_conflicts"] = suspect.num_conflicts;
     one["conflict_share"] = ConflictShare(suspect.num_conflicts, summary);
-    json.push_back(std::move(one));
-  }
-  return json;
+    return one;
+  });
 }
 
 Json RotationSuspectJson(const OutlierFilterSummary& summary) {
@@ -89,14 +81,13 @@ Json SnoopingJson(const std::optional<SnoopingSummary>& snooping) {
 }
 
 Json ProfileLevelsJson(const ErrorProfileSummary& profile) {
-  Json levels = Json::array();
-  for (const ErrorProfileSummary::Level& level : profile.levels) {
-    levels.push_back({{"num_removed", level.num_removed},
-                      {"max_error", level.max_error},
-                      {"lower_bound", NumberOrNull(level.lower_bound)},
-                      {"num_must_go", level.num_proved},
-                      {"point3D_ids", level.point_ids}});
-  }
+  Json levels = ListJson(profile.levels, [&](const auto& level) -> Json {
+    return {{"num_removed", level.num_removed},
+            {"max_error", level.max_error},
+            {"lower_bound", NumberOrNull(level.lower_bound)},
+            {"num_must_go", level.num_proved},
+            {"point3D_ids", level.point_ids}};
+  });
   return {{"levels", std::move(levels)},
           {"elbow", NumberOrNull(profile.elbow)}};
 }
@@ -188,17 +179,15 @@ std::string OutlierCsv(const OutlierFilterSummary& summary) {
 }
 
 Json WeakPartsJson(const OutlierFilterSummary& summary) {
-  Json parts = Json::array();
-  for (const WeakPart& part : summary.weak_parts) {
-    parts.push_back({{"image_names", part.image_names},
-                     {"num_tracks", part.num_tracks},
-                     {"num_agreeing", part.num_agreeing},
-                     {"scale_factor", FiniteOrNull(part.scale_factor)},
-                     {"is_held", part.is_held},
-                     {"turn_deg", part.turn_deg},
-                     {"num_agreeing_turned", part.num_agreeing_turned}});
-  }
-  return parts;
+  return ListJson(summary.weak_parts, [&](const WeakPart& part) -> Json {
+    return {{"image_names", part.image_names},
+            {"num_tracks", part.num_tracks},
+            {"num_agreeing", part.num_agreeing},
+            {"scale_factor", FiniteOrNull(part.scale_factor)},
+            {"is_held", part.is_held},
+            {"turn_deg", part.turn_deg},
+            {"num_agreeing_turned", part.num_agreeing_turned}};
+  });
 }
 
 }  // namespace krot::internal

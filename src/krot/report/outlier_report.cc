@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <string>
-#include <vector>
 
 #include "krot/outliers/robust_start.h"
 #include "krot/report/report_json.h"

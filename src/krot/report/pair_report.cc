@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "krot/analysis/epipolar.h"
+#include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
 #include "krot/report/text_table.h"
 
@@ -33,10 +34,7 @@ std::vector<const CheckedPair*> WronglyMatchedPairs(const PairCheck& check) {
   for (const CheckedPair& pair : check.pairs) {
     if (pair.has_wrong_matches) wrong.push_back(&pair);
   }
-  std::stable_sort(wrong.begin(), wrong.end(),
-                   [](const CheckedPair* a, const CheckedPair* b) {
-                     return a->num_matches > b->num_matches;
-                   });
+  SortLargestFirst(&wrong, &CheckedPair::num_matches);
   return wrong;
 }
 

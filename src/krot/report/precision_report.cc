@@ -6,7 +6,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/geometry.h"
 #include "krot/model/rigs.h"
-#include "krot/report/precision_figures.h"
+#include "krot/report/adjustment_figures.h"
 #include "krot/report/reports.h"
 #include "krot/report/text_table.h"
 

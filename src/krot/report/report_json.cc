@@ -8,10 +8,6 @@ Json FiniteOrNull(double value) {
   return std::isfinite(value) ? Json(value) : Json();
 }
 
-Json VectorJson(const Eigen::Vector3d& vector) {
-  return {vector.x(), vector.y(), vector.z()};
-}
-
 Json ErrorJson(const PixelErrorStatistics& errors) {
   const auto known = [&errors](double value) {
     return errors.count > 0 ? Json(value) : Json();
@@ -89,19 +85,16 @@ Json RotationsJson(const std::optional<RotationInput>& rotations) {
 }
 
 Json NotHeldJson(const LooseParts& loose) {
-  Json images = Json::array();
-  for (const LooseImage& image : loose.images) {
-    images.push_back({{"image_id", image.image_id},
-                      {"image_name", image.image_name},
-                      {"num_observations", image.num_observations},
-                      {"is_determined", image.is_determined},
-                      {"moved", image.moved}});
-  }
-  Json points = Json::array();
-  for (const LoosePoint& point : loose.points) {
-    points.push_back(
-        {{"point3D_id", point.point3D_id}, {"moved", point.moved}});
-  }
+  Json images = ListJson(loose.images, [&](const LooseImage& image) -> Json {
+    return {{"image_id", image.image_id},
+            {"image_name", image.image_name},
+            {"num_observations", image.num_observations},
+            {"is_determined", image.is_determined},
+            {"moved", image.moved}};
+  });
+  Json points = ListJson(loose.points, [&](const LoosePoint& point) -> Json {
+    return {{"point3D_id", point.point3D_id}, {"moved", point.moved}};
+  });
   return {{"images", std::move(images)}, {"points", std::move(points)}};
 }
 

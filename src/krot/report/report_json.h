@@ -10,17 +10,16 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/analysis/model_input.h"
-#include "krot/analysis/position_frame.h"
-#include "krot/convert/certificate_file.h"
+#include "krot/convert/certificate_json.h"
 #include "krot/model.h"
-#include "krot/model/known_distances.h"
 #include "krot/model/model_checks.h"
+#include "krot/model/model_io.h"
 #include "krot/report/sentences.h"
 
 namespace krot::internal {
 
 // What the JSON writers share; only .cc files of this folder use this header.
-using Json = nlohmann::ordered_json;
+using Json = CertificateFileJson;
 
 // The name of an enum's value; the first one's for values that are not listed.
 template <typename Enum>
@@ -39,7 +38,16 @@ Json NumberOrNull(const std::optional<Number>& value) {
 // Null for infinity and NaN.
 Json FiniteOrNull(double value);
 
-Json VectorJson(const Eigen::Vector3d& vector);
+// An observation's ids and image name, and `more`.
+template <typename Observation>
+Json ObservationJson(const Observation& o, const Json& more) {
+  Json json = {{"image_id", o.image_id},
+               {"image_name", o.image_name},
+               {"point2D_idx", o.point2D_idx},
+               {"point3D_id", o.point3D_id}};
+  json.update(more);
+  return json;
+}
 
 // {max, p99, mean, rms}, each null if nothing was counted.
 Json ErrorJson(const PixelErrorStatistics& errors);

@@ -9,21 +9,20 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "krot/analysis/model_comparison.h"
+#include "krot/analysis/model_input.h"
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/noise.h"
-#include "krot/analysis/position_frame.h"
 #include "krot/check.h"
-#include "krot/convert/baseline_certificate.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/model.h"
-#include "krot/model/known_distances.h"
 #include "krot/model/model_checks.h"
+#include "krot/model/model_io.h"
 #include "krot/outliers/match_tracks.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/pipeline/solve_model.h"
+#include "krot/report/adjustment_figures.h"
 #include "krot/report/sentences.h"
-#include "krot/report/survey.h"
 #include "krot/tolerance/tolerance_analysis.h"
 
 namespace krot::internal {

@@ -139,43 +139,32 @@ std::optional<double> LargestTwin(const SolveSummary& summary) {
 }
 
 Json JointIterationsJson(const std::vector<JointIteration>& iterations) {
-  Json json = Json::array();
-  for (const JointIteration& iteration : iterations) {
-    json.push_back({{"method", iteration.target ? "feasible_start" : "joint"},
-                    {"cost", NumberOrNull(iteration.cost)},
-                    {"lower_bound", NumberOrNull(iteration.lower_bound)},
-                    {"gap", NumberOrNull(iteration.gap)},
-                    {"target", NumberOrNull(iteration.target)},
-                    {"seconds", iteration.seconds}});
-  }
-  return json;
+  return ListJson(iterations, [&](const JointIteration& iteration) -> Json {
+    return {{"method", iteration.target ? "feasible_start" : "joint"},
+            {"cost", NumberOrNull(iteration.cost)},
+            {"lower_bound", NumberOrNull(iteration.lower_bound)},
+            {"gap", NumberOrNull(iteration.gap)},
+            {"target", NumberOrNull(iteration.target)},
+            {"seconds", iteration.seconds}};
+  });
 }
 
 Json RoundsJson(const std::vector<Round>& rounds) {
-  Json json = Json::array();
-  for (const Round& round : rounds) {
-    json.push_back(
-        {{"linear_cost", round.linear_cost},
-         {"linear_lower_bound", NumberOrNull(round.linear_lower_bound)},
-         {"step", round.step},
-         {"cost", round.cost},
-         {"lower_bound", NumberOrNull(round.lower_bound)},
-         {"seconds", round.seconds}});
-  }
-  return json;
+  return ListJson(rounds, [&](const Round& round) -> Json {
+    return {{"linear_cost", round.linear_cost},
+            {"linear_lower_bound", NumberOrNull(round.linear_lower_bound)},
+            {"step", round.step},
+            {"cost", round.cost},
+            {"lower_bound", NumberOrNull(round.lower_bound)},
+            {"seconds", round.seconds}};
+  });
 }
 
 Json SupportJson(const std::vector<SupportObservation>& support) {
-  Json json = Json::array();
-  for (const SupportObservation& observation : support) {
-    json.push_back({{"image_id", observation.image_id},
-                    {"image_name", observation.image_name},
-                    {"point2D_idx", observation.point2D_idx},
-                    {"point3D_id", observation.point3D_id},
-                    {"multiplier", observation.multiplier},
-                    {"error_px", observation.error_px}});
-  }
-  return json;
+  return ListJson(support, [&](const SupportObservation& observation) -> Json {
+    return ObservationJson(observation, {{"multiplier", observation.multiplier},
+                                         {"error_px", observation.error_px}});
+  });
 }
 
 Json FactorJson(const std::optional<PositionFactor>& factor) {
@@ -186,8 +175,7 @@ Json FactorJson(const std::optional<PositionFactor>& factor) {
 }
 
 Json PositionsJson(const std::vector<SupportPosition>& positions) {
-  Json json = Json::array();
-  for (const SupportPosition& position : positions) {
+  return ListJson(positions, [&](const SupportPosition& position) -> Json {
     Json entry = position.image_name.empty()
                      ? Json({{"point3D_id", position.point3D_id}})
                      : Json({{"image_id", position.image_id},
@@ -195,9 +183,8 @@ Json PositionsJson(const std::vector<SupportPosition>& positions) {
     entry.update({{"share", position.share},
                   {"distance", position.distance},
                   {"radius", position.radius}});
-    json.push_back(std::move(entry));
-  }
-  return json;
+    return entry;
+  });
 }
 
 Json PolishJson(const std::optional<PolishSummary>& polish) {
@@ -264,10 +251,9 @@ Json OutliersJson(const std::optional<OutlierFilterSummary>& outliers) {
 std::string SolveJson(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
   const Json left_out = LeftOutJson(LeftOutByReason(summary));
-  Json sweeps = Json::array();
-  for (const Sweep& sweep : summary.sweeps) {
-    sweeps.push_back({{"cost", sweep.cost}, {"seconds", sweep.seconds}});
-  }
+  Json sweeps = ListJson(summary.sweeps, [&](const Sweep& sweep) -> Json {
+    return {{"cost", sweep.cost}, {"seconds", sweep.seconds}};
+  });
   std::optional<double> linear_cost, linear_lower_bound;  // of the last round
   if (!summary.rounds.empty()) {
     linear_cost = summary.rounds.back().linear_cost;

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
@@ -52,10 +53,7 @@ double Width(const ToleranceBox& box) {
 std::vector<ToleranceBox> Listed(std::vector<ToleranceBox> boxes,
                                  size_t max_rows) {
   if (boxes.size() <= max_rows) return boxes;
-  std::stable_sort(boxes.begin(), boxes.end(),
-                   [](const ToleranceBox& a, const ToleranceBox& b) {
-                     return Width(a) > Width(b);
-                   });
+  SortLargestFirst(&boxes, &Width);
   boxes.resize(max_rows);
   return boxes;
 }
@@ -93,8 +91,7 @@ Json EndsJson(const std::array<BoxEnd, 3>& ends) {
 }
 
 Json BoxesJson(const std::vector<ToleranceBox>& boxes) {
-  Json json = Json::array();
-  for (const ToleranceBox& box : boxes) {
+  return ListJson(boxes, [&](const ToleranceBox& box) -> Json {
     Json one = box.is_image
                    ? Json{{"image_id", box.id}, {"image_name", box.name}}
                    : Json{{"point3D_id", box.id}};
@@ -102,9 +99,8 @@ Json BoxesJson(const std::vector<ToleranceBox>& boxes) {
     one["is_free"] = box.is_free;
     one["low"] = EndsJson(box.box.low);
     one["high"] = EndsJson(box.box.high);
-    json.push_back(std::move(one));
-  }
-  return json;
+    return one;
+  });
 }
 
 Json EndJson(const BoxEnd& end) {
@@ -112,20 +108,17 @@ Json EndJson(const BoxEnd& end) {
 }
 
 Json LengthsJson(const std::vector<ToleranceLength>& lengths) {
-  Json json = Json::array();
-  for (const ToleranceLength& length : lengths) {
-    json.push_back(
-        {{"name", length.name},
-         {"metres", NumberOrNull(length.metres)},
-         {"tolerance", length.metres ? Json(length.tolerance) : Json()},
-         {"is_bar", length.is_bar},
-         {"length", FiniteOrNull(length.length)},
-         {"is_free", length.is_free},
-         {"low", EndJson(length.low)},
-         {"high", EndJson(length.high)},
-         {"is_contradicted", length.IsContradicted()}});
-  }
-  return json;
+  return ListJson(lengths, [&](const ToleranceLength& length) -> Json {
+    return {{"name", length.name},
+            {"metres", NumberOrNull(length.metres)},
+            {"tolerance", length.metres ? Json(length.tolerance) : Json()},
+            {"is_bar", length.is_bar},
+            {"length", FiniteOrNull(length.length)},
+            {"is_free", length.is_free},
+            {"low", EndJson(length.low)},
+            {"high", EndJson(length.high)},
+            {"is_contradicted", length.IsContradicted()}};
+  });
 }
 
 // Six significant digits. A proved end is rounded in the direction `outwards`

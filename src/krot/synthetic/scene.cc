@@ -2,18 +2,15 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <map>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "krot/base/check.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model/rigs.h"
-#include "krot/synthetic/scene_steps.h"
 
 namespace krot::internal {
 namespace {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <utility>
-#include <vector>
 
 #include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"

@@ -12,7 +12,7 @@
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/model/derived_models.h"
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 

@@ -15,7 +15,7 @@
 #include "krot/linear/blocks.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"
-#include "krot/model/known_distances.h"
+#include "krot/model/model_io.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
