@@ -36,7 +36,7 @@ struct NaiveReprojection {
         sensor, Transform(frame, Vector3d(point[0], point[1], point[2])));
     Eigen::Map<Vector2d> difference(residual);
     difference =
-        ProjectRay(CameraModel::kId, camera, x_cam.hnormalized()) - pixel;
+        ProjectRay({CameraModel::kId, camera}, x_cam.hnormalized()) - pixel;
     return true;
   }
   bool operator()(const double* point, const double* frame,

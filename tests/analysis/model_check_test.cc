@@ -307,8 +307,8 @@ TEST(CheckModel, FindsAnImageThatFitsByChanceWithinFourPixels) {
       for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
         if (model.track_elements[e].image_id != model.images[5].id) continue;
         const Camera& camera = model.cameras[images[5].camera];
-        const auto pixel = ProjectPoint(camera.model_id, camera.params.data(),
-                                        images[5].cam_from_world * point.xyz);
+        const auto pixel =
+            ProjectPoint(camera, images[5].cam_from_world * point.xyz);
         Eigen::Vector2d error;
         do {
           error = {uniform(random), uniform(random)};
@@ -354,8 +354,7 @@ TEST(CheckModel, TellsATrackOfTwoPointsFromScatteredMistakes) {
   for (uint64_t e = point.track_end - 3; e < point.track_end; ++e) {
     const int32_t n = indices.at(model.track_elements[e].image_id);
     const Camera& camera = model.cameras[images[n].camera];
-    const auto pixel = ProjectPoint(camera.model_id, camera.params.data(),
-                                    images[n].cam_from_world * other);
+    const auto pixel = ProjectPoint(camera, images[n].cam_from_world * other);
     Pixel(&model, e).x = pixel->x();
     Pixel(&model, e).y = pixel->y();
   }
@@ -407,7 +406,7 @@ TEST(CheckModel, KnowsHowFirmlyAnImageIsHeld) {
                 ? Eigen::Vector3d(
                       Eigen::AngleAxisd(turn.norm(), turn.normalized()) * x)
                 : x;
-        return *ProjectPoint(camera.model_id, camera.params.data(), x_cam);
+        return *ProjectPoint(camera, x_cam);
       };
       Eigen::MatrixXd J = Eigen::MatrixXd::Zero(2, size);
       for (int c = 0; c < 9; ++c) {

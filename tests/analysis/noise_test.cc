@@ -67,8 +67,7 @@ struct DenseTrack {
       const Point2D& pixel = model.images[n].points2D[element.point2D_idx];
       const double sigma = sigmas.empty() ? 1 : sigmas[e];
       const auto error = [&](const Vector3d& x) -> Vector2d {
-        return *ProjectionError(camera.model_id, camera.params.data(),
-                                {pixel.x, pixel.y},
+        return *ProjectionError(camera, {pixel.x, pixel.y},
                                 images[n].cam_from_world * x) /
                sigma;
       };
@@ -286,8 +285,8 @@ TEST(EstimateNoise, TakesAPointAtInfinityForWhatItIs) {
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
       const int32_t n = indices.at(model.track_elements[e].image_id);
       const Camera& camera = model.cameras[geometries[n].camera];
-      const auto pixel = ProjectPoint(camera.model_id, camera.params.data(),
-                                      geometries[n].cam_from_world * point.xyz);
+      const auto pixel =
+          ProjectPoint(camera, geometries[n].cam_from_world * point.xyz);
       ASSERT_TRUE(pixel);
       PixelOf(&model, e).x = pixel->x() + normal(random);
       PixelOf(&model, e).y = pixel->y() + normal(random);

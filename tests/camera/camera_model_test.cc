@@ -47,13 +47,13 @@ TEST(CameraModels, OnlyEquirectangularHasNoImagePlane) {
 TEST(CameraModels, WithoutImagePlaneAreRefusedByNameOfTheArgument) {
   const double params[] = {2000, 1000};
   try {
-    ProjectRay(Equirectangular::kId, params, {0, 0});
+    ProjectRay({Equirectangular::kId, params}, {0, 0});
     FAIL() << "EQUIRECTANGULAR was projected";
   } catch (const std::invalid_argument& error) {
     EXPECT_THAT(error.what(), testing::StartsWith("model_id = 17, must be"));
   }
-  EXPECT_THROW(ProjectionJacobian(18, params, {0, 0}), std::invalid_argument);
-  EXPECT_THROW(UndistortPixel(-1, params, {0, 0}), std::invalid_argument);
+  EXPECT_THROW(ProjectionJacobian({18, params}, {0, 0}), std::invalid_argument);
+  EXPECT_THROW(UndistortPixel({-1, params}, {0, 0}), std::invalid_argument);
 }
 
 TEST(VisitCameraModel, CallsTheVisitorWithTheModelOfTheId) {

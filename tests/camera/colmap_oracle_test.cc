@@ -46,7 +46,7 @@ class OracleModel {
         // x_cam = x_world + (0.1 view, 0, 0) at depth 2.
         const Eigen::Vector2d offset = 5 * RandomRay(1, &random_);
         const Eigen::Vector2d pixel =
-            ProjectRay(model_id, params.data(),
+            ProjectRay({model_id, params.data()},
                        u + Eigen::Vector2d(0.05 * view, 0)) +
             offset;
         observations[view] << pixel.x() << ' ' << pixel.y() << ' ' << point_id

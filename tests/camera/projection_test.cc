@@ -17,7 +17,7 @@ Eigen::Vector2d Project(std::string_view name,
                         const Eigen::Vector2d& u) {
   const CameraModelInfo& model = *FindCameraModel(name);
   EXPECT_EQ(static_cast<size_t>(model.num_params), params.size()) << name;
-  return ProjectRay(model.id, params.data(), u);
+  return ProjectRay({model.id, params.data()}, u);
 }
 
 void ExpectSamePixel(const Eigen::Vector2d& actual,
@@ -186,7 +186,7 @@ TEST(ProjectionJacobian, AgreesWithCentralDifferences) {
       const Eigen::Matrix2d expected = camera.NumericJacobian(u);
       if (!expected.allFinite()) continue;  // beyond DIVISION's last ray
       const Eigen::Matrix2d J =
-          ProjectionJacobian(id, camera.params().data(), u);
+          ProjectionJacobian({id, camera.params().data()}, u);
       EXPECT_LT((J - expected).norm(), 1e-6 * (1 + J.norm())) << ModelName(id);
     }
   }
@@ -197,7 +197,7 @@ TEST(ProjectionJacobian, IsExactOnTheAxis) {
   for (const int id : ImagePlaneModelIds()) {
     const RandomCamera camera(id, &random);
     const Eigen::Matrix2d J =
-        ProjectionJacobian(id, camera.params().data(), {0, 0});
+        ProjectionJacobian({id, camera.params().data()}, {0, 0});
     ASSERT_TRUE(J.allFinite()) << ModelName(id);
     EXPECT_EQ(J(0, 1), 0) << ModelName(id);
     EXPECT_EQ(J(1, 0), 0) << ModelName(id);

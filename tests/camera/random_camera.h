@@ -28,7 +28,7 @@ class RandomCamera {
   const std::vector<double>& params() const { return params_; }
 
   Eigen::Vector2d Project(const Eigen::Vector2d& u) const {
-    return ProjectRay(model_id_, params_.data(), u);
+    return ProjectRay({model_id_, params_.data()}, u);
   }
 
   // d pixel / d u by central differences of ProjectRay.

@@ -34,19 +34,19 @@ struct Trial {
 
 // A pixel with a ray up to `max_angle` off the axis, and a point up to a level
 // or so away from it.
-std::optional<Trial> DrawTrial(int model_id, const double* params,
-                               double max_angle, std::mt19937* random) {
+std::optional<Trial> DrawTrial(Intrinsics intrinsics, double max_angle,
+                               std::mt19937* random) {
   constexpr double kNorms[] = {1, 2, kInfinity};
   std::uniform_real_distribution<double> unit(0, 1);
   Trial trial;
   trial.level_px = 1 + 9 * unit(*random);
   trial.p = kNorms[(*random)() % 3];
   const Eigen::Vector3d bearing = RandomBearing(max_angle, random);
-  const auto pixel = ProjectPoint(model_id, params, bearing);
+  const auto pixel = ProjectPoint(intrinsics, bearing);
   if (!pixel) return std::nullopt;
   trial.pixel = *pixel;
   const auto x_hat = PixelBearing(
-      model_id, params, *pixel + 1.2 * trial.level_px * RandomRay(1, random),
+      intrinsics, *pixel + 1.2 * trial.level_px * RandomRay(1, random),
       bearing);
   if (!x_hat) return std::nullopt;
   trial.x_hat = *x_hat;
@@ -57,17 +57,15 @@ std::optional<Trial> DrawTrial(int model_id, const double* params,
 // the pixel's own ray to the border of |f| <= level, each ray by Newton's steps
 // from the one before. A way ends where these lose it; where there is a region,
 // none should.
-std::vector<Eigen::Vector2d> SampleLinearErrors(int model_id,
-                                                const double* params,
+std::vector<Eigen::Vector2d> SampleLinearErrors(Intrinsics intrinsics,
                                                 const Trial& trial,
                                                 std::mt19937* random) {
   constexpr int kNumWays = 100;
   constexpr int kRaysPerWay = 100;
   constexpr double kOnTheWay = 1e-6;  // pixels
   const Eigen::Matrix3d E =
-      *RowAtProjection(model_id, params, trial.pixel, trial.x_hat);
-  const auto pixels_ray =
-      PixelBearing(model_id, params, trial.pixel, trial.x_hat);
+      *RowAtProjection(intrinsics, trial.pixel, trial.x_hat);
+  const auto pixels_ray = PixelBearing(intrinsics, trial.pixel, trial.x_hat);
   std::vector<Eigen::Vector2d> errors;
   for (int way = 0; way < kNumWays && pixels_ray; ++way) {
     Eigen::Vector2d end = RandomRay(1, random);
@@ -79,15 +77,15 @@ std::vector<Eigen::Vector2d> SampleLinearErrors(int model_id,
     Eigen::Vector3d ray = *pixels_ray;
     for (int n = 1; n <= kRaysPerWay; ++n) {
       const Eigen::Vector2d target = n * end / kRaysPerWay;
-      auto error = ProjectionError(model_id, params, trial.pixel, ray);
+      auto error = ProjectionError(intrinsics, trial.pixel, ray);
       for (int step = 0; step < 5 && error; ++step) {
         if ((*error - target).norm() <= kOnTheWay) break;
-        const Chart chart = *ChartAt(model_id, params, ray);
-        const Eigen::Matrix2d J = ChartJacobian(model_id, params, chart, ray);
+        const Chart chart = *ChartAt(intrinsics, ray);
+        const Eigen::Matrix2d J = ChartJacobian(intrinsics, chart, ray);
         ray = (ray / chart.n.dot(ray) +
                chart.B * (J.inverse() * (target - *error)))
                   .normalized();
-        error = ProjectionError(model_id, params, trial.pixel, ray);
+        error = ProjectionError(intrinsics, trial.pixel, ray);
       }
       if (!error || !((*error - target).norm() <= kOnTheWay)) break;
       if (NormOf(*error, trial.p) > trial.level_px) continue;
@@ -101,11 +99,11 @@ std::vector<Eigen::Vector2d> SampleLinearErrors(int model_id,
 }
 
 // The largest |v / w| / level of the sample; -1 below it are none.
-double SampleKappa(int model_id, const double* params, const Trial& trial,
+double SampleKappa(Intrinsics intrinsics, const Trial& trial,
                    std::mt19937* random) {
   double largest = 0;
   for (const Eigen::Vector2d& error :
-       SampleLinearErrors(model_id, params, trial, random)) {
+       SampleLinearErrors(intrinsics, trial, random)) {
     largest = std::max(largest, NormOf(error, trial.p) / trial.level_px);
   }
   return largest - 1;
@@ -151,11 +149,11 @@ TEST_P(RemainderBoundOf, IsNeverExceededAndNearlyReached) {
     const std::vector<double> params =
         is_strong ? StrongParams(GetParam(), &random)
                   : RandomCamera(GetParam(), &random).params();
-    const auto trial =
-        DrawTrial(GetParam(), params.data(), LargestAngle(GetParam()), &random);
+    const auto trial = DrawTrial({GetParam(), params.data()},
+                                 LargestAngle(GetParam()), &random);
     if (!trial) continue;
     const auto bound = [&](double sufficient) {
-      return RemainderBound(GetParam(), params.data(), trial->pixel,
+      return RemainderBound({GetParam(), params.data()}, trial->pixel,
                             trial->x_hat, trial->level_px, trial->p,
                             sufficient);
     };
@@ -163,7 +161,7 @@ TEST_P(RemainderBoundOf, IsNeverExceededAndNearlyReached) {
     if (!kappa) continue;
     ++num_bounded;
     const double sampled =
-        SampleKappa(GetParam(), params.data(), *trial, &random);
+        SampleKappa({GetParam(), params.data()}, *trial, &random);
     EXPECT_LE(sampled, *kappa + 1e-9);
     const auto sufficient = bound(0.1);
     ASSERT_TRUE(sufficient);
@@ -185,17 +183,17 @@ TEST_P(RemainderBoundOf, InOneDirectionIsNeverExceeded) {
   int num_bounded = 0;
   for (int i = 0; i < 30; ++i) {
     const std::vector<double> params = StrongParams(GetParam(), &random);
-    const auto trial =
-        DrawTrial(GetParam(), params.data(), LargestAngle(GetParam()), &random);
+    const auto trial = DrawTrial({GetParam(), params.data()},
+                                 LargestAngle(GetParam()), &random);
     if (!trial) continue;
     const Eigen::Vector2d y = 3 * RandomRay(1, &random);
-    const auto bound = SupportBound(GetParam(), params.data(), trial->pixel,
+    const auto bound = SupportBound({GetParam(), params.data()}, trial->pixel,
                                     trial->x_hat, y, trial->level_px, trial->p);
     if (!bound) continue;
     ++num_bounded;
     double largest = 0;
     for (const Eigen::Vector2d& error :
-         SampleLinearErrors(GetParam(), params.data(), *trial, &random)) {
+         SampleLinearErrors({GetParam(), params.data()}, *trial, &random)) {
       largest = std::max(largest, -y.dot(error));
     }
     EXPECT_LE(largest, *bound + 1e-8 * y.norm());  // of the rays' rounding
@@ -208,13 +206,14 @@ TEST_P(RemainderBoundOf, InOneDirectionIsTheSameWhereNothingIsSufficient) {
   int num_bounded = 0;
   for (int i = 0; i < 20; ++i) {
     const std::vector<double> params = StrongParams(GetParam(), &random);
-    const auto trial =
-        DrawTrial(GetParam(), params.data(), LargestAngle(GetParam()), &random);
+    const auto trial = DrawTrial({GetParam(), params.data()},
+                                 LargestAngle(GetParam()), &random);
     if (!trial) continue;
     const Eigen::Vector2d y = 3 * RandomRay(1, &random);
     const auto bound = [&](double sufficient) {
-      return SupportBound(GetParam(), params.data(), trial->pixel, trial->x_hat,
-                          y, trial->level_px, trial->p, sufficient);
+      return SupportBound({GetParam(), params.data()}, trial->pixel,
+                          trial->x_hat, y, trial->level_px, trial->p,
+                          sufficient);
     };
     const auto smallest = bound(0);
     if (!smallest) continue;
@@ -245,20 +244,20 @@ TEST_P(RemainderBoundOf, IsTheBallsOwnInTheDirectionOfThePoint) {
     const RandomCamera camera(GetParam(), &random);
     const double* params = camera.params().data();
     auto trial =
-        DrawTrial(GetParam(), params, LargestAngle(GetParam()), &random);
+        DrawTrial({GetParam(), params}, LargestAngle(GetParam()), &random);
     if (!trial) continue;
     const Eigen::Vector2d y = 3 * RandomRay(1, &random);
     const auto x_hat = PixelBearing(
-        GetParam(), params,
+        {GetParam(), params},
         trial->pixel + trial->level_px * FarthestAgainst(y, trial->p),
         trial->x_hat);
     if (!x_hat) continue;
-    const auto kappa = RemainderBound(GetParam(), params, trial->pixel, *x_hat,
-                                      trial->level_px, trial->p);
+    const auto kappa = RemainderBound({GetParam(), params}, trial->pixel,
+                                      *x_hat, trial->level_px, trial->p);
     if (!kappa || *kappa > kMild) continue;
     ++num_mild;
-    const auto bound = SupportBound(GetParam(), params, trial->pixel, *x_hat, y,
-                                    trial->level_px, trial->p);
+    const auto bound = SupportBound({GetParam(), params}, trial->pixel, *x_hat,
+                                    y, trial->level_px, trial->p);
     ASSERT_TRUE(bound);
     const double own = trial->level_px * DualNormOf(y, trial->p);
     EXPECT_GE(*bound, (1 - 1e-9) * own);
@@ -269,8 +268,8 @@ TEST_P(RemainderBoundOf, IsTheBallsOwnInTheDirectionOfThePoint) {
 
 TEST(RemainderBound, OfPinholesIsZero) {
   const double params[] = {500, 600, 320, 240};
-  EXPECT_EQ(RemainderBound(1, params, {10, 20}, {0.1, 0.2, 1}, 3, 2), 0.0);
-  EXPECT_FALSE(RemainderBound(1, params, {10, 20}, {0.1, 0.2, -1}, 3, 2));
+  EXPECT_EQ(RemainderBound({1, params}, {10, 20}, {0.1, 0.2, 1}, 3, 2), 0.0);
+  EXPECT_FALSE(RemainderBound({1, params}, {10, 20}, {0.1, 0.2, -1}, 3, 2));
 }
 
 // SIMPLE_RADIAL with k = -0.3 and f = 1000 folds 702.728 px from the centre.
@@ -278,7 +277,7 @@ TEST(RemainderBound, HasNoRegionWhereTheDiscCrossesAFold) {
   const double params[] = {1000, 0, 0, -0.3};
   const auto bound = [&](double radius, double level_px) {
     const Eigen::Vector2d pixel(radius, 0);
-    return RemainderBound(2, params, pixel, *PixelBearing(2, params, pixel),
+    return RemainderBound({2, params}, pixel, *PixelBearing({2, params}, pixel),
                           level_px, 2);
   };
   EXPECT_TRUE(bound(690, 3));
@@ -295,7 +294,7 @@ TEST(RemainderBound, OnTheAxisIsTheCubicTerm) {
   double r = 0.08;
   for (int i = 0; i < 50; ++i) r = 0.08 / (1 - 0.4 * r * r);
   const double exact = 100 * r / 8 - 1;
-  const auto kappa = RemainderBound(2, params, {0, 0}, {0, 0, 1}, 8, 2);
+  const auto kappa = RemainderBound({2, params}, {0, 0}, {0, 0, 1}, 8, 2);
   ASSERT_TRUE(kappa);
   EXPECT_GE(*kappa, exact);
   EXPECT_LE(*kappa, 1.11 * exact + 1e-6);
@@ -305,20 +304,20 @@ TEST(RemainderBound, IsTheSameAtTheSeamOfAPanorama) {
   const double params[] = {3600, 1800};
   const auto bound = [&](double x) {
     const Eigen::Vector2d pixel(x, 500);
-    return RemainderBound(17, params, pixel,
-                          *PixelBearing(17, params, {x + 2, 501}), 4, 2);
+    return RemainderBound({17, params}, pixel,
+                          *PixelBearing({17, params}, {x + 2, 501}), 4, 2);
   };
   ASSERT_TRUE(bound(1800) && bound(0.5));
   EXPECT_NEAR(*bound(0.5), *bound(1800), 0.05 * *bound(1800));
-  EXPECT_FALSE(RemainderBound(17, params, {1800, 2},
-                              *PixelBearing(17, params, {1800, 5}), 4, 2));
+  EXPECT_FALSE(RemainderBound({17, params}, {1800, 2},
+                              *PixelBearing({17, params}, {1800, 5}), 4, 2));
 }
 
 TEST(RemainderBound, NamesArgumentsThatAreOutOfRange) {
   const double params[] = {500, 600, 320, 240};
-  EXPECT_THROW(RemainderBound(1, params, {0, 0}, {0, 0, 1}, 0, 2),
+  EXPECT_THROW(RemainderBound({1, params}, {0, 0}, {0, 0, 1}, 0, 2),
                std::invalid_argument);
-  EXPECT_THROW(RemainderBound(1, params, {0, 0}, {0, 0, 1}, 1, 3),
+  EXPECT_THROW(RemainderBound({1, params}, {0, 0}, {0, 0, 1}, 1, 3),
                std::invalid_argument);
 }
 

@@ -17,7 +17,7 @@ namespace {
 std::optional<UndistortedObservation> Undistort(
     int model_id, const std::vector<double>& params,
     const Eigen::Vector2d& pixel) {
-  return UndistortPixel(model_id, params.data(), pixel);
+  return UndistortPixel({model_id, params.data()}, pixel);
 }
 
 // What UndistortedObservation promises.
@@ -78,7 +78,7 @@ TEST_P(EveryModel, RefusesAMirroredCamera) {
   std::vector<double> params = camera.params();
   params[0] = -params[0];  // det J < 0 everywhere
   const Eigen::Vector2d pixel =
-      ProjectRay(GetParam(), params.data(), {0.1, 0.1});
+      ProjectRay({GetParam(), params.data()}, {0.1, 0.1});
   EXPECT_FALSE(Undistort(GetParam(), params, pixel));
 }
 
@@ -118,8 +118,8 @@ TEST_F(SimpleRadialFold, ARayThatReproducesThePixelBeyondItIsNotTaken) {
                                            // all the way from the axis
   for (const Eigen::Vector2d& ray : {beyond, farther}) {
     const Eigen::Vector2d pixel =
-        ProjectRay(SimpleRadial::kId, params_.data(), ray);
-    const auto found = PixelBearing(SimpleRadial::kId, params_.data(), pixel,
+        ProjectRay({SimpleRadial::kId, params_.data()}, ray);
+    const auto found = PixelBearing({SimpleRadial::kId, params_.data()}, pixel,
                                     Eigen::Vector3d(ray.homogeneous()));
     ASSERT_EQ(found.has_value(), !(pixel.norm() > fold_px_));
     if (!found) continue;
@@ -192,11 +192,11 @@ TEST(UndistortPixel, DoesNotCrossThePoleOfARationalDistortion) {
   for (const Eigen::Vector2d& beyond :
        {Eigen::Vector2d(0.6, 0), Eigen::Vector2d(0, 2)}) {
     const Eigen::Vector2d pixel =
-        ProjectRay(FullOpenCv::kId, params.data(), beyond);
+        ProjectRay({FullOpenCv::kId, params.data()}, beyond);
     const auto observation = Undistort(FullOpenCv::kId, params, pixel);
     ASSERT_TRUE(observation);
     EXPECT_LT(observation->u.norm(), 0.5);
-    const auto bearing = PixelBearing(FullOpenCv::kId, params.data(), pixel,
+    const auto bearing = PixelBearing({FullOpenCv::kId, params.data()}, pixel,
                                       Eigen::Vector3d(beyond.homogeneous()));
     ASSERT_TRUE(bearing);
     EXPECT_LT(bearing->hnormalized().norm(), 0.5);
@@ -206,7 +206,7 @@ TEST(UndistortPixel, DoesNotCrossThePoleOfARationalDistortion) {
 TEST(UndistortPixel, OfTheFovModelInvertsTheSmallOmegaPolynomial) {
   const std::vector<double> params = {1000, 1000, 0, 0, 5e-3};
   for (const double r : {0.0, 1e-6, 0.4, 3.0, 1e3}) {
-    const Eigen::Vector2d pixel = ProjectRay(Fov::kId, params.data(), {r, 0});
+    const Eigen::Vector2d pixel = ProjectRay({Fov::kId, params.data()}, {r, 0});
     const auto observation = Undistort(Fov::kId, params, pixel);
     ASSERT_TRUE(observation) << r;
     EXPECT_NEAR(observation->u.x(), r, 1e-12 * (1 + r));

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "krot/camera/camera_model.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
-#include "krot/camera/camera_model.h"
 #include "krot/model.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
@@ -122,8 +122,7 @@ TEST(BuildProblem, SaysWhereEachObservationCameFrom) {
     EXPECT_EQ(built.pixels[i], pixel);
     const Eigen::Vector3d x_cam =
         Reprojection(model, built).InCamera(built.start, i);
-    const auto row =
-        RowAtProjection(camera.model_id, camera.params.data(), pixel, x_cam);
+    const auto row = RowAtProjection(camera, pixel, x_cam);
     ASSERT_TRUE(row);
     EXPECT_NEAR((observation.E - *row).norm(), 0, 1e-9 * row->norm());
   }

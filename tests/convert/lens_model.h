@@ -51,7 +51,7 @@ inline Model MakeLensModel(const LensModelOptions& options) {
     image.cam_from_world.translation = -(q * centre);
     for (const Point3D& point : model.points3D) {
       const Eigen::Vector2d pixel =
-          ProjectPoint(options.camera_model_id, options.params.data(),
+          ProjectPoint({options.camera_model_id, options.params.data()},
                        q * (point.xyz - centre))
               .value() +
           options.pixel_noise * vector3().head<2>();

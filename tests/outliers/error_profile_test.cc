@@ -104,6 +104,7 @@ TEST(ErrorProfile, HasTheOptimaOfAnIndependentOracle) {
   for (const Norm norm : {Norm::LInf(), Norm::L1()}) {
     const ErrorProfile profile =
         FindErrorProfile(scene.model, built, {norm, 2.0}, {});
+    ASSERT_FALSE(profile.levels.empty());
     for (const ProfileLevel& level : profile.levels) {
       double largest = 0;
       for (const std::vector<int64_t>& part :

@@ -42,6 +42,7 @@ TEST(FilterOutliers, FindsPlantedOutliersAboveFourTimesTheBound) {
       ++num_large;
       num_found += removed.count({element.image_id, element.point2D_idx}) > 0;
     }
+    ASSERT_GT(num_large, 0);
     EXPECT_GE(num_found, 0.99 * num_large) << "of " << num_large;
     EXPECT_LE(result.summary.num_proved,
               static_cast<int64_t>(scene.outliers.size()));

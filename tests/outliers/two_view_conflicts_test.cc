@@ -55,8 +55,10 @@ TEST(TwoViewConflicts, CandidatesAreOfTwoViewsAndOfWhatMayBeUsed) {
   for (size_t i = 0; i < c.worth.size(); i += 3) c.worth[i] = 0;
   const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate,
                                    kTwoViewBound);
+  size_t num_candidates = 0;
   for (const int64_t i : c.removal.observations) {
     for (const std::vector<int64_t>& set : conflicts.Candidates(i, c.worth)) {
+      ++num_candidates;
       EXPECT_TRUE(std::is_sorted(set.begin(), set.end()));
       std::set<int32_t> views;
       for (const int64_t j : set) {
@@ -67,6 +69,7 @@ TEST(TwoViewConflicts, CandidatesAreOfTwoViewsAndOfWhatMayBeUsed) {
       EXPECT_TRUE(std::binary_search(set.begin(), set.end(), i));
     }
   }
+  EXPECT_GT(num_candidates, 0u);
 }
 
 TEST(TwoViewConflicts, HasNoCandidateForWhatIsWithinTheBound) {

@@ -24,11 +24,9 @@ void SeeByPinholes(const Model& model, const Estimate& truth,
   const Reprojection reprojection(model, *built);
   for (size_t i = 0; i < built->pixels.size(); ++i) {
     const int64_t index = static_cast<int64_t>(i);
-    const Reprojection::Source& source = reprojection.SourceOf(index);
+    const Intrinsics& source = reprojection.SourceOf(index);
     const auto error_at = [&](const Eigen::Vector3d& ray) {
-      return ProjectionError(source.model_id, source.params, built->pixels[i],
-                             ray)
-          .value();
+      return ProjectionError(source, built->pixels[i], ray).value();
     };
     const Eigen::Vector3d n = reprojection.InCamera(truth, index).normalized();
     Eigen::Matrix<double, 2, 3> B;

@@ -25,9 +25,7 @@ constexpr double kBaseline = 1e-3;
 Eigen::Vector2d PixelOf(const Model& model, const Image& image,
                         const Eigen::Vector3d& xyz) {
   const Camera& camera = model.cameras[0];
-  return ProjectPoint(camera.model_id, camera.params.data(),
-                      image.cam_from_world.Transform() * xyz)
-      .value();
+  return ProjectPoint(camera, image.cam_from_world.Transform() * xyz).value();
 }
 
 // Image 1 stands a thousandth beside image 0, and both see a point right in

@@ -140,8 +140,7 @@ double DualValue(const Model& model, const CertificateFile& file) {
     const Camera& camera = model.cameras[geometries[n].camera];
     const Point2D& point2D = model.images[n].points2D[o.point2D_idx];
     const Eigen::Matrix3d E =
-        *RowAtProjection(camera.model_id, camera.params.data(),
-                         {point2D.x, point2D.y}, o.bearing);
+        *RowAtProjection(camera, {point2D.x, point2D.y}, o.bearing);
     const Vector3d force =
         geometries[n].cam_from_world.rotation.transpose() *
         (E.transpose() * Vector3d(file.rows_bound * o.lambda, o.y[0], o.y[1]));

@@ -225,8 +225,7 @@ Twins WithTwin(Model model) {
     point.xyz = Inverse(pose) * Vector3d(0.05 * n - 0.1, 0.1, depth);
     point.track_begin = model.track_elements.size();
     twins.undetermined.push_back(point.id);
-    const Vector2d pixel =
-        *ProjectPoint(camera.model_id, camera.params.data(), pose * point.xyz);
+    const Vector2d pixel = *ProjectPoint(camera, pose * point.xyz);
     int side = 1;
     for (Image* image : {&model.images[2], &twin}) {
       model.track_elements.push_back(
@@ -326,8 +325,7 @@ TEST(SettleEstimate, SaysNothingOfPointsThatAreFarAway) {
     point.track_begin = model.track_elements.size();
     for (Image& image : model.images) {
       const auto pixel =
-          ProjectPoint(camera.model_id, camera.params.data(),
-                       image.cam_from_world.Transform() * point.xyz);
+          ProjectPoint(camera, image.cam_from_world.Transform() * point.xyz);
       if (!pixel || pixel->x() < 0 || pixel->y() < 0 ||
           pixel->x() > static_cast<double>(camera.width) ||
           pixel->y() > static_cast<double>(camera.height)) {

@@ -67,7 +67,7 @@ Model WithAPointInACamera(Model model) {
     Image& image = model.images[n];
     const Camera& camera = model.cameras[0];
     const Eigen::Vector2d pixel =
-        ProjectPoint(camera.model_id, camera.params.data(),
+        ProjectPoint(camera,
                      ImageGeometries(model)[n].cam_from_world * point.xyz)
             .value_or(Eigen::Vector2d::Zero());
     model.track_elements.push_back(

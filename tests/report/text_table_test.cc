@@ -13,10 +13,10 @@ TEST(TextTable, AlignsTheFirstColumnLeftAndTheOthersRight) {
   table.AddRow({"", "before", "after"});
   table.AddRow({"max error", "10.5", "2"});
   table.AddRow({"note"});
-  EXPECT_EQ(table.ToString(""),
-            "           before  after\n"
-            "max error    10.5      2\n"
-            "note\n");
+  EXPECT_EQ(table.ToString(),
+            "             before  after\n"
+            "  max error    10.5      2\n"
+            "  note\n");
 }
 
 TEST(FormatNumber, ShowsADashForWhatIsNotFinite) {

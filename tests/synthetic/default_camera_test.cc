@@ -18,8 +18,7 @@ TEST_P(DefaultCameraOfModel, HasTheParametersOfItsModel) {
 
 TEST_P(DefaultCameraOfModel, ProjectsTheAxisToTheMiddleOfTheImage) {
   const Camera camera = DefaultCamera(GetParam(), 1024, 768, 1000);
-  const Eigen::Vector2d pixel = ProjectRay(
-      camera.model_id, camera.params.data(), Eigen::Vector2d::Zero());
+  const Eigen::Vector2d pixel = ProjectRay(camera, Eigen::Vector2d::Zero());
   EXPECT_EQ(pixel, Eigen::Vector2d(512, 384));
 }
 
@@ -28,8 +27,7 @@ TEST_P(DefaultCameraOfModel, HasOneRayForEveryPixelAtTheWidestAngle) {
   for (int x = 0; x <= 1024; x += 64) {
     for (int y = 0; y <= 1024; y += 64) {
       const Eigen::Vector2d pixel(x, y);
-      ASSERT_TRUE(UndistortPixel(camera.model_id, camera.params.data(), pixel))
-          << pixel.transpose();
+      ASSERT_TRUE(UndistortPixel(camera, pixel)) << pixel.transpose();
     }
   }
 }
@@ -43,9 +41,7 @@ TEST_P(DefaultCameraOfModel, DistortsByPixelsIfTheModelCanDistort) {
   const bool two_focal_lengths = camera.params[1] != 512;
   const Eigen::Vector2d pinhole_px(
       1000 * u.x() + 512, (two_focal_lengths ? 1010 : 1000) * u.y() + 384);
-  const double distortion_px =
-      (ProjectRay(camera.model_id, camera.params.data(), u) - pinhole_px)
-          .norm();
+  const double distortion_px = (ProjectRay(camera, u) - pinhole_px).norm();
   if (is_pinhole) {
     EXPECT_LT(distortion_px, 1e-9);
   } else {

@@ -40,11 +40,9 @@ std::vector<SceneObservation> RecomputeObservations(const Model& model) {
       observation.point = k;
       observation.depth = x_cam.z();
       observation.measured = {point2D.x, point2D.y};
-      observation.projected =
-          camera.model_id == kPanorama
-              ? ProjectToPanorama(camera, x_cam)
-              : ProjectRay(camera.model_id, camera.params.data(),
-                           x_cam.hnormalized());
+      observation.projected = camera.model_id == kPanorama
+                                  ? ProjectToPanorama(camera, x_cam)
+                                  : ProjectRay(camera, x_cam.hnormalized());
       observations.push_back(observation);
     }
   }

@@ -82,8 +82,7 @@ TEST_P(SceneOfCamera, HasAllPixelsInsideItsImagesAndUndistortable) {
     EXPECT_GE(o.measured.minCoeff(), 0);
     EXPECT_LE(o.measured.x(), options.image_width);
     EXPECT_LE(o.measured.y(), options.image_height);
-    EXPECT_TRUE(
-        UndistortPixel(camera.model_id, camera.params.data(), o.measured));
+    EXPECT_TRUE(UndistortPixel(camera, o.measured));
   }
 }
 

@@ -107,10 +107,8 @@ int RunBlocksBenchmark(const std::vector<std::string>& arguments) {
                     "Points to measure per model, evenly spread");
   parser.AddInteger("max_frames", &options.max_frames, AtLeast(1),
                     "Frames to measure per model, evenly spread");
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.common.log, parser.Help());
+  if (!ParseOrPrintHelp(arguments, options.common.log, &parser))
     return kExitDone;
-  }
   if (options.common.input_paths.empty()) {
     throw OptionError("--input_path is required");
   }

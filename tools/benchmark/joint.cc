@@ -2,7 +2,6 @@
 // with that of COLMAP's `bundle_adjuster`, from start to exit, on the same
 // models in the same run.
 
-#include <algorithm>
 #include <fstream>
 #include <optional>
 #include <string>
@@ -135,10 +134,8 @@ int RunJointBenchmark(const std::vector<std::string>& arguments) {
                  "The gap to prove");
   parser.AddInteger("num_threads", &options.num_threads, AtLeast(-1),
                     "krot's threads; -1 or 0: all. COLMAP takes all");
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.common.log, parser.Help());
+  if (!ParseOrPrintHelp(arguments, options.common.log, &parser))
     return kExitDone;
-  }
   if (options.common.input_paths.empty()) {
     throw OptionError("--input_path is required");
   }

@@ -210,10 +210,8 @@ int RunKnownRotationBenchmark(const std::vector<std::string>& arguments) {
                     "paper's Table 2");
   parser.AddReal("time_limit", &options.time_limit, Above(0.0, "seconds"),
                  "After which a rival or the paper's method is given up");
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.common.log, parser.Help());
+  if (!ParseOrPrintHelp(arguments, options.common.log, &parser))
     return kExitDone;
-  }
   CheckReportPaths(options.common);
   Contest contest(options);
   const std::vector<std::string> left_out = MeasureModels(

@@ -194,10 +194,8 @@ int RunScalingBenchmark(const std::vector<std::string>& arguments) {
                  "ever longer tracks");
   parser.AddInteger("num_threads", &options.num_threads, AtLeast(-1),
                     "krot's threads; -1 or 0: all");
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.common.log, parser.Help());
+  if (!ParseOrPrintHelp(arguments, options.common.log, &parser))
     return kExitDone;
-  }
   if (!options.common.input_paths.empty()) {
     throw OptionError("scaling measures synthetic models only");
   }

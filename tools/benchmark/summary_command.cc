@@ -32,10 +32,7 @@ int RunSummaryBenchmark(const std::vector<std::string>& arguments) {
                  "Where the reports of the other commands are, NAME.json");
   parser.AddChoice("format", &options.format, {"text", "markdown"},
                    "How to print the table");
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.log, parser.Help());
-    return kExitDone;
-  }
+  if (!ParseOrPrintHelp(arguments, options.log, &parser)) return kExitDone;
   if (!std::filesystem::is_directory(folder)) {
     throw OptionError("report_path = " + folder + ", must be a folder");
   }

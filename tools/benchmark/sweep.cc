@@ -2,8 +2,6 @@
 // with `fast` settings, compared with one pass over the data, and the speed-up
 // by more threads.
 
-#include <algorithm>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -125,10 +123,8 @@ int RunSweepBenchmark(const std::vector<std::string>& arguments) {
                     "well; 0: none");
   parser.AddInteger("max_paper_observations", &options.max_paper_observations,
                     AtLeast(0), "Paper settings do not run on more");
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.common.log, parser.Help());
+  if (!ParseOrPrintHelp(arguments, options.common.log, &parser))
     return kExitDone;
-  }
   CheckReportPaths(options.common);
   const std::string threads =
       std::to_string(ResolveNumThreads(options.num_threads));

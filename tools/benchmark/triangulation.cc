@@ -1,7 +1,6 @@
 // krot_benchmark triangulation: Figure 4 and Table 1 of [Zhang18], with all
 // rivals on the same instances in the same run.
 
-#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -237,10 +236,8 @@ int RunTriangulationBenchmark(const std::vector<std::string>& arguments) {
                     "Points to measure per model, evenly spread");
   parser.AddBool("figure4", &options.figure4,
                  "Measure random cameras as well (Figure 4 of the paper)");
-  if (!parser.Parse(arguments)) {
-    PrintTable(options.common.log, parser.Help());
+  if (!ParseOrPrintHelp(arguments, options.common.log, &parser))
     return kExitDone;
-  }
   CheckReportPaths(options.common);
   const Norm norm = options.norm == "2" ? Norm::L2() : Norm::LInf();
   BenchmarkReport report;

@@ -176,7 +176,7 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
   AddWriteOnInterrupt(&paths, &parser);
   options.AddTo(&parser);
   AddCommonOptions(&common, &parser);
-  if (!ParseOrPrintHelp(arguments, common, &parser)) return kExitDone;
+  if (!ParseOrPrintHelp(arguments, common.log, &parser)) return kExitDone;
   CheckPositionsPath(paths, parser);
   if (parser.IsGiven("BundleAdjustment.max_error") ||
       parser.IsGiven("BundleAdjustment.max_error_factor")) {

@@ -110,7 +110,8 @@ int RunCertificateChecker(const std::vector<std::string>& arguments) {
                       "more matches, from a COLMAP model and the certificate's "
                       "file alone");
   AddCheckerOptions(&options, &parser);
-  if (!ParseOrPrintHelp(arguments, options.common, &parser)) return kExitDone;
+  if (!ParseOrPrintHelp(arguments, options.common.log, &parser))
+    return kExitDone;
   CheckSidePath("report_path", options.report_path);
   const std::string json = ReadCertificateText(options.certificate_path);
   if (HoldsBaselines(json)) return CheckBaselines(options, json);

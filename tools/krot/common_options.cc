@@ -36,11 +36,4 @@ void AddCommonOptions(CommonOptions* options, OptionParser* parser,
   });
 }
 
-bool ParseOrPrintHelp(const std::vector<std::string>& arguments,
-                      const CommonOptions& options, OptionParser* parser) {
-  if (parser->Parse(arguments)) return true;
-  PrintTable(options.log, parser->Help());
-  return false;
-}
-
 }  // namespace krot::internal

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
@@ -22,9 +21,5 @@ void AddCommonOptions(
     CommonOptions* options, OptionParser* parser,
     const char* of_seed =
         "Accepted everywhere; this command draws no random numbers");
-
-// Sets the values, or prints the help that is asked for and returns false.
-bool ParseOrPrintHelp(const std::vector<std::string>& arguments,
-                      const CommonOptions& options, OptionParser* parser);
 
 }  // namespace krot::internal

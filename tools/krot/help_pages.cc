@@ -1,7 +1,6 @@
 #include "tools/krot/help_pages.h"
 
 #include <sstream>
-#include <utility>
 
 #include "krot/version.h"
 

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cstdlib>
 #include <exception>
-#include <functional>
 #include <iostream>
 #include <new>
 #include <string>

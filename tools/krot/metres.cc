@@ -1,7 +1,5 @@
 #include "tools/krot/metres.h"
 
-#include <utility>
-
 #include "krot/compare.h"
 #include "krot/context.h"
 #include "krot/model/model_io.h"

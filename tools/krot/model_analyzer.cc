@@ -145,7 +145,8 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
                       "shows a COLMAP model's reprojection errors by image "
                       "and camera, its worst observations, tracks and depths");
   AddAnalyzerOptions(&options, &parser);
-  if (!ParseOrPrintHelp(arguments, options.common, &parser)) return kExitDone;
+  if (!ParseOrPrintHelp(arguments, options.common.log, &parser))
+    return kExitDone;
   const std::string path = ModelPath(options, parser);
   CheckAnalyzerPaths(options, path, parser);
   const auto [model, contradictions, poses] = ReadToShow(path, options, parser);

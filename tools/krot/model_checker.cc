@@ -1,6 +1,5 @@
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "krot/base/context.h"
@@ -15,7 +14,6 @@
 #include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
-#include "tools/krot/same_path.h"
 #include "tools/krot/suspect_crops.h"
 
 namespace krot::internal {
@@ -213,7 +211,8 @@ int RunModelChecker(const std::vector<std::string>& arguments) {
                       "are wrong, which images are weakly held, and what to do "
                       "next; writes the model without what is wrong");
   AddCheckerOptions(&command, &parser);
-  if (!ParseOrPrintHelp(arguments, command.common, &parser)) return kExitDone;
+  if (!ParseOrPrintHelp(arguments, command.common.log, &parser))
+    return kExitDone;
   return Run(command, parser);
 }
 

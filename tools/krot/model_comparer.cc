@@ -199,7 +199,8 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
                       "shows how two COLMAP models of the same images differ: "
                       "poses, points and reprojection errors");
   AddComparerOptions(&options, &parser);
-  if (!ParseOrPrintHelp(arguments, options.common, &parser)) return kExitDone;
+  if (!ParseOrPrintHelp(arguments, options.common.log, &parser))
+    return kExitDone;
   CheckComparerPaths(options, parser);
   const auto [model1, contradictions1, poses1] = ReadValidModel(
       options.input_path1, options.on_contradiction, options.common.log);

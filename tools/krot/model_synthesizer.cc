@@ -165,7 +165,8 @@ int RunModelSynthesizer(const std::vector<std::string>& arguments) {
   OptionParser parser("model_synthesizer",
                       "makes a COLMAP model with known ground truth");
   AddSynthesizerOptions(&options, &parser);
-  if (!ParseOrPrintHelp(arguments, options.common, &parser)) return kExitDone;
+  if (!ParseOrPrintHelp(arguments, options.common.log, &parser))
+    return kExitDone;
   const SceneOptions scene_options = ToSceneOptions(options);
   WriteModelOptions write_options;
   write_options.format =

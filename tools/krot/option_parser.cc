@@ -1,6 +1,5 @@
 #include "tools/krot/option_parser.h"
 
-#include <algorithm>
 #include <optional>
 #include <utility>
 

@@ -8,6 +8,7 @@
 #include "krot/options/option_table.h"
 #include "tools/krot/command_error.h"
 #include "tools/krot/help_pages.h"
+#include "tools/krot/log.h"
 
 namespace krot::internal {
 
@@ -53,5 +54,13 @@ class OptionParser : public OptionTable {
   std::function<void()> on_parsed_;
   HelpFormat help_format_ = HelpFormat::kText;
 };
+
+// Sets the values, or prints the help that is asked for and returns false.
+inline bool ParseOrPrintHelp(const std::vector<std::string>& arguments,
+                             const LogOptions& log, OptionParser* parser) {
+  if (parser->Parse(arguments)) return true;
+  PrintTable(log, parser->Help());
+  return false;
+}
 
 }  // namespace krot::internal

@@ -14,7 +14,6 @@
 #include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
-#include "tools/krot/same_path.h"
 #include "tools/krot/solve_progress.h"
 #include "tools/krot/suspect_crops.h"
 
@@ -202,7 +201,8 @@ int RunOutlierFilter(const std::vector<std::string>& arguments) {
                       "a bound, and proves how many must go; rotations, "
                       "intrinsics and the coordinate frame stay");
   AddOutlierOptions(&command, &parser);
-  if (!ParseOrPrintHelp(arguments, command.common, &parser)) return kExitDone;
+  if (!ParseOrPrintHelp(arguments, command.common.log, &parser))
+    return kExitDone;
   CheckPairs(parser, &command);
   return Run(command);
 }

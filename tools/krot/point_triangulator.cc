@@ -178,7 +178,8 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
   AddSolveOptions(&command.options.solve, &command.context, &parser);
   AddMatchesOptions(&matches, &parser);
   AddCommonOptions(&command.common, &parser);
-  if (!ParseOrPrintHelp(arguments, command.common, &parser)) return kExitDone;
+  if (!ParseOrPrintHelp(arguments, command.common.log, &parser))
+    return kExitDone;
   RefuseOfOtherKind(matches, parser);
   if (!matches.database_path.empty()) return RunOnMatches(command, matches);
   CheckSolveOptions(command.options.solve, parser);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <string>
 
 #include "krot/pipeline/solve_model.h"
 #include "tools/krot/log.h"

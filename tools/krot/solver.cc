@@ -1,4 +1,3 @@
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -84,7 +83,8 @@ int RunSolver(const std::vector<std::string>& arguments) {
                        "many observations must be left out, as JSON");
   AddSolverOptions(&command.options, &command.context, &parser);
   AddCommonOptions(&command.common, &parser);
-  if (!ParseOrPrintHelp(arguments, command.common, &parser)) return kExitDone;
+  if (!ParseOrPrintHelp(arguments, command.common.log, &parser))
+    return kExitDone;
   ResolveSolverOptions(parser, &command.options.solve);
   ResolveDatabase(parser, &command);
   CheckPositionsPath(command.paths, parser);

@@ -81,7 +81,7 @@ std::optional<Vector2d> SuspectCrops::Projection(int32_t image,
   const ImageGeometry& geometry = geometry_[image];
   if (!k || !geometry.has_pose) return std::nullopt;
   const Camera& camera = result_.cameras[geometry.camera];
-  return ProjectPoint(camera.model_id, camera.params.data(),
+  return ProjectPoint(camera,
                       geometry.cam_from_world * result_.points3D[*k].xyz);
 }
 

@@ -1,4 +1,3 @@
-#include <atomic>
 #include <string>
 #include <utility>
 #include <vector>
@@ -158,7 +157,8 @@ int RunToleranceAnalyzer(const std::vector<std::string>& arguments) {
       "within a bound, proved; rotations and intrinsics as given. It is no "
       "covariance, and says nothing about rotations that are wrong");
   AddCommandOptions(&command, &parser);
-  if (!ParseOrPrintHelp(arguments, command.common, &parser)) return kExitDone;
+  if (!ParseOrPrintHelp(arguments, command.common.log, &parser))
+    return kExitDone;
   CheckPairs(parser);
   return Run(command);
 }

@@ -32,8 +32,7 @@ bool IsUsable(const ImageGeometry& geometry, const Camera& camera,
               const Vector3d& xyz) {
   const Vector3d x_cam = geometry.cam_from_world * xyz;
   if (!(x_cam.z() > 0)) return false;
-  return ProjectRay(camera.model_id, camera.params.data(), x_cam.hnormalized())
-      .allFinite();
+  return ProjectRay(camera, x_cam.hnormalized()).allFinite();
 }
 
 void CollectObservations(const Model& model, int min_track_length,

@@ -10,6 +10,7 @@
 
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/context.h"
+#include "krot/camera/camera_model.h"
 #include "krot/linear/blocks.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"
@@ -267,7 +268,7 @@ struct DifferentiatedPixel {
 // `J_params` is not null it gets the derivatives by the camera's parameters, 2
 // x num_params, row by row. Throws as ProjectRay does; not finite where its
 // pixel is not.
-DifferentiatedPixel DifferentiatePixel(int model_id, const double* params,
+DifferentiatedPixel DifferentiatePixel(Intrinsics intrinsics,
                                        const Eigen::Vector2d& ray,
                                        double* J_params);
 

@@ -136,11 +136,11 @@ bool ReprojectionCost::Evaluate(double const* const* blocks, double* residuals,
   const Eigen::Vector2d ray = x_cam.hnormalized();
   Eigen::Map<Eigen::Vector2d> residual(residuals);
   if (jacobians == nullptr) {
-    residual = ProjectRay(camera_model_, blocks[camera], ray) - pixel_;
+    residual = ProjectRay({camera_model_, blocks[camera]}, ray) - pixel_;
     return residual.allFinite();
   }
-  const DifferentiatedPixel projected =
-      DifferentiatePixel(camera_model_, blocks[camera], ray, jacobians[camera]);
+  const DifferentiatedPixel projected = DifferentiatePixel(
+      {camera_model_, blocks[camera]}, ray, jacobians[camera]);
   residual = projected.pixel - pixel_;
   Matrix23 J;  // by x_cam, then by x_rig
   J << projected.J_ray, -projected.J_ray * ray;

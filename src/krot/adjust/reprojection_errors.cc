@@ -129,7 +129,7 @@ Matrix3d Project(int camera_model, const std::vector<double>& params,
   const auto num_params = static_cast<int>(params.size());
   double J_params[2 * kMaxCameraParams];  // row by row
   const DifferentiatedPixel projected =
-      DifferentiatePixel(camera_model, params.data(), ray,
+      DifferentiatePixel({camera_model, params.data()}, ray,
                          columns.params.empty() ? nullptr : J_params);
   for (size_t n = 0; n < columns.params.size(); ++n) {
     const int param = columns.params[n];
@@ -156,7 +156,7 @@ std::optional<std::vector<ProjectedError>> ProjectErrors(
     if (s >= 0) x = sensors[s] * x + TranslationOf(blocks.sensors[s]);
     const int32_t c = observation.camera;
     return ProjectedError{
-        ProjectRay(blocks.camera_models[c], blocks.cameras[c].data(),
+        ProjectRay({blocks.camera_models[c], blocks.cameras[c].data()},
                    x.hnormalized()) -
             observation.pixel,
         x.z()};
@@ -189,11 +189,12 @@ double LargestError(const std::vector<ProjectedError>& errors) {
   return std::sqrt(largest2);
 }
 
-DifferentiatedPixel DifferentiatePixel(int model_id, const double* params,
+DifferentiatedPixel DifferentiatePixel(Intrinsics intrinsics,
                                        const Eigen::Vector2d& ray,
                                        double* J_params) {
-  return VisitCameraModel(model_id, [&](auto camera) {
-    return PixelOf<decltype(camera)>::Differentiate(params, ray, J_params);
+  return VisitCameraModel(intrinsics.model_id, [&](auto camera) {
+    return PixelOf<decltype(camera)>::Differentiate(intrinsics.params, ray,
+                                                    J_params);
   });
 }
 

@@ -124,8 +124,7 @@ class ImageAdder {
           model_.images[n].points2D[model_.track_elements[e].point2D_idx];
       const Vector3d x_cam = pose * noise_.points[k];
       if (!(x_cam.norm() > nearest_[n])) continue;
-      const auto E = RowAtProjection(camera.model_id, camera.params.data(),
-                                     {pixel.x, pixel.y}, x_cam);
+      const auto E = RowAtProjection(camera, {pixel.x, pixel.y}, x_cam);
       if (!E) continue;
       const double depth = E->row(0).dot(x_cam);
       PoseRow row;

@@ -61,6 +61,8 @@ struct RotationInput {
 RotationInput TakeRotations(const FileBytes& file, Model* model,
                             int num_threads = -1, const FileNote& note = {});
 
+// ---- Known positions ----
+
 // Positions in a frame of their own (metres of a survey, UTM, a receiver's):
 // the similarity from the model's frame to it, and which positions are wrong.
 

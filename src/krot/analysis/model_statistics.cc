@@ -299,8 +299,8 @@ double PixelError(const CameraPose& pose, const Camera& camera,
                   const Point2D& point2D, const Eigen::Vector3d& xyz,
                   Norm norm) {
   const Eigen::Vector3d x_cam = pose.rotation * xyz + pose.translation;
-  const std::optional<Eigen::Vector2d> difference = ProjectionError(
-      camera.model_id, camera.params.data(), {point2D.x, point2D.y}, x_cam);
+  const std::optional<Eigen::Vector2d> difference =
+      ProjectionError(camera, {point2D.x, point2D.y}, x_cam);
   if (!difference) return kNaN;
   const double error = NormOf(*difference, norm);
   return std::isfinite(error) ? error : kNaN;

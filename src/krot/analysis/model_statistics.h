@@ -103,6 +103,8 @@ DepthStatistics ComputeDepthStatistics(const Model& model);
 // of squared track lengths).
 ValueRange TriangulationAnglesDeg(const Model& model, int num_threads = -1);
 
+// ---- Colours, for COLMAP's GUI ----
+
 // The colour of an error: from blue at 0 by green and yellow to dark red at
 // `top_px` and above, linear between six stops, as on the report page; grey if
 // the error is not finite. Requires top_px > 0.

@@ -72,9 +72,7 @@ class TrackNoise::Track {
         view.cam_from_world_rotation * (X.head<3>() - X[3] * c);
     const Point2D& pixel =
         view.image->points2D[all_.model_.track_elements[e].point2D_idx];
-    const auto E =
-        RowAtProjection(view.camera->model_id, view.camera->params.data(),
-                        {pixel.x, pixel.y}, x_cam);
+    const auto E = RowAtProjection(*view.camera, {pixel.x, pixel.y}, x_cam);
     if (!E) return std::nullopt;
     const double depth = E->row(0).dot(x_cam);
     Row row;
@@ -248,8 +246,7 @@ Vector2d TrackNoise::ErrorOf(uint64_t e) const {
   const Point2D& pixel =
       view.image->points2D[model_.track_elements[e].point2D_idx];
   return ProjectionError(
-             view.camera->model_id, view.camera->params.data(),
-             {pixel.x, pixel.y},
+             *view.camera, {pixel.x, pixel.y},
              view.cam_from_world_rotation * (X.head<3>() - X[3] * view.center))
       .value_or(Vector2d::Constant(kNaN));
 }

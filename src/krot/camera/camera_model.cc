@@ -70,20 +70,21 @@ const CameraModelInfo* FindCameraModel(std::string_view name) {
   return model == models.end() ? nullptr : &*model;
 }
 
-Eigen::Vector2d ProjectRay(int model_id, const double* params,
-                           const Eigen::Vector2d& u) {
-  return VisitCameraModel(model_id, [&](auto model) {
+Eigen::Vector2d ProjectRay(Intrinsics intrinsics, const Eigen::Vector2d& u) {
+  return VisitCameraModel(intrinsics.model_id, [&](auto model) {
     Eigen::Vector2d pixel;
-    model.Project(params, u.x(), u.y(), &pixel.x(), &pixel.y());
+    model.Project(intrinsics.params, u.x(), u.y(), &pixel.x(), &pixel.y());
     return pixel;
   });
 }
 
-Eigen::Matrix2d ProjectionJacobian(int model_id, const double* params,
+Eigen::Matrix2d ProjectionJacobian(Intrinsics intrinsics,
                                    const Eigen::Vector2d& u) {
-  return VisitCameraModel(model_id, [&](auto model) {
-    return Differentiate(u, [&](const auto& a, const auto& b, auto* x,
-                                auto* y) { model.Project(params, a, b, x, y); })
+  return VisitCameraModel(intrinsics.model_id, [&](auto model) {
+    return Differentiate(u,
+                         [&](const auto& a, const auto& b, auto* x, auto* y) {
+                           model.Project(intrinsics.params, a, b, x, y);
+                         })
         .derivative;
   });
 }
@@ -105,25 +106,27 @@ bool HasChartOnImagePlane(double z) {
 }  // namespace
 
 std::optional<UndistortedObservation> UndistortPixel(
-    int model_id, const double* params, const Eigen::Vector2d& pixel) {
+    Intrinsics intrinsics, const Eigen::Vector2d& pixel) {
   return VisitEveryCameraModel(
-      model_id, [&](auto model) -> std::optional<UndistortedObservation> {
+      intrinsics.model_id,
+      [&](auto model) -> std::optional<UndistortedObservation> {
         using Model = decltype(model);
         if constexpr (kHasImagePlane<Model>) {
-          return Undistort<Model>(params, pixel);
+          return Undistort<Model>(intrinsics.params, pixel);
         }
         return std::nullopt;
       });
 }
 
-std::optional<Chart> ChartAt(int model_id, const double* params,
+std::optional<Chart> ChartAt(Intrinsics intrinsics,
                              const Eigen::Vector3d& x_cam) {
   if (!x_cam.allFinite() || x_cam.isZero(0)) return std::nullopt;
   const Eigen::Vector3d bearing = x_cam.stableNormalized();
   return VisitEveryCameraModel(
-      model_id, [&](auto model) -> std::optional<Chart> {
+      intrinsics.model_id, [&](auto model) -> std::optional<Chart> {
         using Model = decltype(model);
-        if (!Model::Sees(params, bearing.x(), bearing.y(), bearing.z())) {
+        if (!Model::Sees(intrinsics.params, bearing.x(), bearing.y(),
+                         bearing.z())) {
           return std::nullopt;
         }
         Chart chart;
@@ -139,16 +142,15 @@ std::optional<Chart> ChartAt(int model_id, const double* params,
       });
 }
 
-Eigen::Matrix2d ChartJacobian(int model_id, const double* params,
-                              const Chart& chart,
+Eigen::Matrix2d ChartJacobian(Intrinsics intrinsics, const Chart& chart,
                               const Eigen::Vector3d& x_cam) {
   const Eigen::Vector3d on_chart = x_cam / chart.n.dot(x_cam);
-  return VisitEveryCameraModel(model_id, [&](auto model) {
+  return VisitEveryCameraModel(intrinsics.model_id, [&](auto model) {
     Dual<double> X[3], x, y;
     for (int i = 0; i < 3; ++i) {
       X[i] = {on_chart[i], chart.B(i, 0), chart.B(i, 1)};
     }
-    decltype(model)::ProjectPoint(params, X[0], X[1], X[2], &x, &y);
+    decltype(model)::ProjectPoint(intrinsics.params, X[0], X[1], X[2], &x, &y);
     Eigen::Matrix2d J;
     J << x.du, x.dv, y.du, y.dv;
     return J;
@@ -243,42 +245,41 @@ std::optional<Eigen::Vector3d> BearingOf<Equirectangular>(
 
 }  // namespace
 
-std::optional<Eigen::Vector2d> ProjectPoint(int model_id, const double* params,
+std::optional<Eigen::Vector2d> ProjectPoint(Intrinsics intrinsics,
                                             const Eigen::Vector3d& x_cam) {
-  return IfFinite(VisitEveryCameraModel(model_id, [&](auto model) {
-    return Project<decltype(model)>(params, x_cam);
+  return IfFinite(VisitEveryCameraModel(intrinsics.model_id, [&](auto model) {
+    return Project<decltype(model)>(intrinsics.params, x_cam);
   }));
 }
 
-std::optional<Eigen::Vector2d> ProjectionError(int model_id,
-                                               const double* params,
+std::optional<Eigen::Vector2d> ProjectionError(Intrinsics intrinsics,
                                                const Eigen::Vector2d& pixel,
                                                const Eigen::Vector3d& x_cam) {
-  std::optional<Eigen::Vector2d> error = ProjectPoint(model_id, params, x_cam);
+  std::optional<Eigen::Vector2d> error = ProjectPoint(intrinsics, x_cam);
   if (!error) return std::nullopt;
   *error -= pixel;
-  if (model_id == Equirectangular::kId) {
-    error->x() = std::remainder(error->x(), params[0]);
+  if (intrinsics.model_id == Equirectangular::kId) {
+    error->x() = std::remainder(error->x(), intrinsics.params[0]);
   }
   return IfFinite(*error);
 }
 
-std::optional<Eigen::Matrix3d> RowAtProjection(int model_id,
-                                               const double* params,
+std::optional<Eigen::Matrix3d> RowAtProjection(Intrinsics intrinsics,
                                                const Eigen::Vector2d& pixel,
                                                const Eigen::Vector3d& x_hat) {
   Eigen::Matrix3d E;
-  if (VisitEveryCameraModel(model_id, [&](auto model) {
-        return RowOnImagePlane<decltype(model)>(params, pixel, x_hat, &E);
+  if (VisitEveryCameraModel(intrinsics.model_id, [&](auto model) {
+        return RowOnImagePlane<decltype(model)>(intrinsics.params, pixel, x_hat,
+                                                &E);
       })) {
     return E.allFinite() ? std::optional(E) : std::nullopt;
   }
-  const auto error = ProjectionError(model_id, params, pixel, x_hat);
+  const auto error = ProjectionError(intrinsics, pixel, x_hat);
   if (!error) return std::nullopt;
-  const auto chart = ChartAt(model_id, params, x_hat);
+  const auto chart = ChartAt(intrinsics, x_hat);
   if (!chart) return std::nullopt;
   const Eigen::Vector3d on_chart = x_hat / chart->n.dot(x_hat);
-  const Eigen::Matrix2d J = ChartJacobian(model_id, params, *chart, on_chart);
+  const Eigen::Matrix2d J = ChartJacobian(intrinsics, *chart, on_chart);
   const Eigen::Vector2d p_hat = chart->B.transpose() * on_chart;
   E.row(0) = chart->n.transpose();
   E.bottomRows<2>() =
@@ -288,10 +289,10 @@ std::optional<Eigen::Matrix3d> RowAtProjection(int model_id,
 }
 
 std::optional<Eigen::Vector3d> PixelBearing(
-    int model_id, const double* params, const Eigen::Vector2d& pixel,
+    Intrinsics intrinsics, const Eigen::Vector2d& pixel,
     const std::optional<Eigen::Vector3d>& x_start) {
-  const auto X = VisitEveryCameraModel(model_id, [&](auto model) {
-    return BearingOf<decltype(model)>(params, pixel, x_start);
+  const auto X = VisitEveryCameraModel(intrinsics.model_id, [&](auto model) {
+    return BearingOf<decltype(model)>(intrinsics.params, pixel, x_start);
   });
   if (!X || !X->allFinite()) return std::nullopt;
   return X->stableNormalized();

@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "krot/model.h"
+
 namespace krot::internal {
 
 // COLMAP's camera models, chosen at run time by their ids. Loops over many
@@ -29,17 +31,25 @@ const std::vector<CameraModelInfo>& CameraModels();
 const CameraModelInfo* FindCameraModel(int id);
 const CameraModelInfo* FindCameraModel(std::string_view name);
 
-// `params` holds as many parameters as the model has. All functions throw
-// std::invalid_argument for an unknown model, ProjectRay and ProjectionJacobian
-// also for one without an image plane.
+// A camera's model and its parameters, as many as the model has.
+struct Intrinsics {
+  Intrinsics(int id, const double* first) : model_id(id), params(first) {}
+  Intrinsics(const Camera& camera)  // NOLINT(google-explicit-constructor)
+      : Intrinsics(camera.model_id, camera.params.data()) {}
+
+  int model_id;
+  const double* params;
+};
+
+// All functions throw std::invalid_argument for an unknown model, ProjectRay
+// and ProjectionJacobian also for one without an image plane.
 
 // The pixel of the ray (u, 1), as COLMAP defines it; the centre of the upper
 // left pixel is (0.5, 0.5). Not finite where the model is not defined.
-Eigen::Vector2d ProjectRay(int model_id, const double* params,
-                           const Eigen::Vector2d& u);
+Eigen::Vector2d ProjectRay(Intrinsics intrinsics, const Eigen::Vector2d& u);
 
 // d pixel / d u at u, 2x2, exact (by forward differentiation).
-Eigen::Matrix2d ProjectionJacobian(int model_id, const double* params,
+Eigen::Matrix2d ProjectionJacobian(Intrinsics intrinsics,
                                    const Eigen::Vector2d& u);
 
 // An observation undistorted onto the plane z = 1, with what the residual in
@@ -62,7 +72,7 @@ struct UndistortedObservation {
 // 0.1 to 0.5 microseconds for ordinary distortions; tens of microseconds where
 // no ray exists.
 std::optional<UndistortedObservation> UndistortPixel(
-    int model_id, const double* params, const Eigen::Vector2d& pixel);
+    Intrinsics intrinsics, const Eigen::Vector2d& pixel);
 
 // A plane n'X = 1 on which nearby rays of a camera have two coordinates p:
 // X(p) = n + B p, with B'B = I, B'n = 0, |n| = 1.
@@ -86,12 +96,12 @@ struct Chart {
 //
 // nullopt if the point does not project: x_cam is zero or not finite, behind a
 // perspective camera, or not seen by the lens (lens.h).
-std::optional<Chart> ChartAt(int model_id, const double* params,
+std::optional<Chart> ChartAt(Intrinsics intrinsics,
                              const Eigen::Vector3d& x_cam);
 
 // d pixel / d p at the ray of x_cam, 2x2.
-Eigen::Matrix2d ChartJacobian(int model_id, const double* params,
-                              const Chart& chart, const Eigen::Vector3d& x_cam);
+Eigen::Matrix2d ChartJacobian(Intrinsics intrinsics, const Chart& chart,
+                              const Eigen::Vector3d& x_cam);
 
 // The projection of points in the camera's frame, for every model, and its
 // first-order expansion, from which the solver takes its rows.
@@ -104,12 +114,11 @@ Eigen::Matrix2d ChartJacobian(int model_id, const double* params,
 
 // The pixel of x_cam. For z > 0 and models 0 to 16 it is ProjectRay(x / z,
 // y / z) to the bit.
-std::optional<Eigen::Vector2d> ProjectPoint(int model_id, const double* params,
+std::optional<Eigen::Vector2d> ProjectPoint(Intrinsics intrinsics,
                                             const Eigen::Vector3d& x_cam);
 
 // ProjectPoint minus `pixel`; on a panorama by the shorter way round.
-std::optional<Eigen::Vector2d> ProjectionError(int model_id,
-                                               const double* params,
+std::optional<Eigen::Vector2d> ProjectionError(Intrinsics intrinsics,
                                                const Eigen::Vector2d& pixel,
                                                const Eigen::Vector3d& x_cam);
 
@@ -123,8 +132,7 @@ std::optional<Eigen::Vector2d> ProjectionError(int model_id,
 // and correct to first order around it; w > 0 on the chart's side of the
 // camera. The length of x_hat does not matter. nullopt if the point does not
 // project or J is not finite (at the poles of a panorama).
-std::optional<Eigen::Matrix3d> RowAtProjection(int model_id,
-                                               const double* params,
+std::optional<Eigen::Matrix3d> RowAtProjection(Intrinsics intrinsics,
                                                const Eigen::Vector2d& pixel,
                                                const Eigen::Vector3d& x_hat);
 
@@ -138,7 +146,7 @@ std::optional<Eigen::Matrix3d> RowAtProjection(int model_id,
 // cameras of every model and six starts each, it did in 2 of 510,000 trials,
 // both of RAD_TAN_THIN_PRISM_FISHEYE beyond 90 degrees.)
 std::optional<Eigen::Vector3d> PixelBearing(
-    int model_id, const double* params, const Eigen::Vector2d& pixel,
+    Intrinsics intrinsics, const Eigen::Vector2d& pixel,
     const std::optional<Eigen::Vector3d>& x_start = {});
 
 }  // namespace krot::internal

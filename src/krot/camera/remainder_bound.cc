@@ -83,12 +83,12 @@ class ModelErrorMap : public ErrorMap {
 
 }  // namespace
 
-std::unique_ptr<ErrorMap> MakeErrorMap(int model_id, const double* params,
+std::unique_ptr<ErrorMap> MakeErrorMap(Intrinsics intrinsics,
                                        const ErrorMap::Geometry& geometry) {
   return VisitEveryCameraModel(
-      model_id, [&](auto model) -> std::unique_ptr<ErrorMap> {
-        return std::make_unique<ModelErrorMap<decltype(model)>>(params,
-                                                                geometry);
+      intrinsics.model_id, [&](auto model) -> std::unique_ptr<ErrorMap> {
+        return std::make_unique<ModelErrorMap<decltype(model)>>(
+            intrinsics.params, geometry);
       });
 }
 
@@ -112,19 +112,19 @@ struct Region {
 };
 
 // Finds U of remainder_bound.h.
-std::optional<Region> FindRegion(int model_id, const double* params,
+std::optional<Region> FindRegion(Intrinsics intrinsics,
                                  const Eigen::Vector2d& pixel,
                                  const Eigen::Vector3d& x_hat, double level_px,
                                  double p) {
-  const auto E = RowAtProjection(model_id, params, pixel, x_hat);
-  const auto bearing = PixelBearing(model_id, params, pixel, x_hat);
-  const auto chart = ChartAt(model_id, params, x_hat);
+  const auto E = RowAtProjection(intrinsics, pixel, x_hat);
+  const auto bearing = PixelBearing(intrinsics, pixel, x_hat);
+  const auto chart = ChartAt(intrinsics, x_hat);
   if (!E || !bearing || !chart) return std::nullopt;
   // The pixel's ray must not be too far from x_hat.
   const double depth = chart->n.dot(*bearing);
   if (!(depth > 0.1 * bearing->norm())) return std::nullopt;
   const Eigen::Vector3d X0 = *bearing / depth;
-  const Eigen::Matrix2d J0 = ChartJacobian(model_id, params, *chart, X0);
+  const Eigen::Matrix2d J0 = ChartJacobian(intrinsics, *chart, X0);
   if (!(J0.determinant() > 0)) return std::nullopt;
 
   ErrorMap::Geometry geometry;
@@ -137,7 +137,7 @@ std::optional<Region> FindRegion(int model_id, const double* params,
   geometry.level_px = level_px;
   if (!geometry.G.allFinite()) return std::nullopt;
   Region region;
-  region.map = MakeErrorMap(model_id, params, geometry);
+  region.map = MakeErrorMap(intrinsics, geometry);
   // Half the sides of the parallelogram, in units of level_px of the linearised
   // lens. The first one is taken with |f| > gamma on the whole boundary.
   for (const double reach : {1.125, 1.5, 2.5, 4.0}) {
@@ -150,17 +150,17 @@ std::optional<Region> FindRegion(int model_id, const double* params,
 
 }  // namespace
 
-std::optional<double> RemainderBound(int model_id, const double* params,
+std::optional<double> RemainderBound(Intrinsics intrinsics,
                                      const Eigen::Vector2d& pixel,
                                      const Eigen::Vector3d& x_hat,
                                      double level_px, double p,
                                      double sufficient) {
   CheckArguments(level_px, p);
-  if (IsPinhole(model_id)) {
-    if (!RowAtProjection(model_id, params, pixel, x_hat)) return std::nullopt;
+  if (IsPinhole(intrinsics.model_id)) {
+    if (!RowAtProjection(intrinsics, pixel, x_hat)) return std::nullopt;
     return 0;
   }
-  const auto region = FindRegion(model_id, params, pixel, x_hat, level_px, p);
+  const auto region = FindRegion(intrinsics, pixel, x_hat, level_px, p);
   if (!region) return std::nullopt;
   const auto largest =
       LargestLinearError(*region->map, p, region->reach, 1 + sufficient);
@@ -168,7 +168,7 @@ std::optional<double> RemainderBound(int model_id, const double* params,
   return std::max(0.0, *largest - 1);
 }
 
-std::optional<double> SupportBound(int model_id, const double* params,
+std::optional<double> SupportBound(Intrinsics intrinsics,
                                    const Eigen::Vector2d& pixel,
                                    const Eigen::Vector3d& x_hat,
                                    const Eigen::Vector2d& y, double level_px,
@@ -177,17 +177,18 @@ std::optional<double> SupportBound(int model_id, const double* params,
   const double length = DualNorm(y, {p}) * (1 + kRounding);
   if (!(length > 0))
     return length == 0 ? std::optional<double>(0) : std::nullopt;
-  if (IsPinhole(model_id)) {
-    if (!RowAtProjection(model_id, params, pixel, x_hat)) return std::nullopt;
+  if (IsPinhole(intrinsics.model_id)) {
+    if (!RowAtProjection(intrinsics, pixel, x_hat)) return std::nullopt;
     // The linear error is the true one except for the rounding of the row,
     // which is proportional to the terms whose difference the row is.
-    const Eigen::Vector2d centre = model_id == SimplePinhole::kId
-                                       ? Eigen::Vector2d(params[1], params[2])
-                                       : Eigen::Vector2d(params[2], params[3]);
+    const Eigen::Vector2d centre =
+        intrinsics.model_id == SimplePinhole::kId
+            ? Eigen::Vector2d(intrinsics.params[1], intrinsics.params[2])
+            : Eigen::Vector2d(intrinsics.params[2], intrinsics.params[3]);
     const double terms = pixel.lpNorm<1>() + centre.lpNorm<1>() + 2 * level_px;
     return length * (level_px + 2 * kRounding * terms);
   }
-  const auto region = FindRegion(model_id, params, pixel, x_hat, level_px, p);
+  const auto region = FindRegion(intrinsics, pixel, x_hat, level_px, p);
   if (!region) return std::nullopt;
   const double unit = length * level_px * (1 + kRounding);
   const auto largest = LargestAlong(*region->map, p, region->reach, y / length,

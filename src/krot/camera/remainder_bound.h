@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/camera/camera_model.h"
 #include "krot/camera/interval.h"
 
 namespace krot::internal {
@@ -37,7 +38,7 @@ namespace krot::internal {
 // milliseconds near folds, and tens of microseconds for a sufficient 0.1.
 //
 // Requires gamma > 0 and p = 1, 2 or infinity.
-std::optional<double> RemainderBound(int model_id, const double* params,
+std::optional<double> RemainderBound(Intrinsics intrinsics,
                                      const Eigen::Vector2d& pixel,
                                      const Eigen::Vector3d& x_hat,
                                      double level_px, double p,
@@ -52,7 +53,7 @@ std::optional<double> RemainderBound(int model_id, const double* params,
 // lens. U, nullopt and cost are as above. The result is at most 1e-7 gamma |y|
 // above its smallest value unless the budget of cells ends first, or any value
 // that is at most `sufficient`, which may be found much faster.
-std::optional<double> SupportBound(int model_id, const double* params,
+std::optional<double> SupportBound(Intrinsics intrinsics,
                                    const Eigen::Vector2d& pixel,
                                    const Eigen::Vector3d& x_hat,
                                    const Eigen::Vector2d& y, double level_px,
@@ -89,7 +90,7 @@ class ErrorMap {
                                                 const Interval& q2) const = 0;
 };
 
-std::unique_ptr<ErrorMap> MakeErrorMap(int model_id, const double* params,
+std::unique_ptr<ErrorMap> MakeErrorMap(Intrinsics intrinsics,
                                        const ErrorMap::Geometry& geometry);
 
 // Branch and bound over the box |q|_inf <= reach of an ErrorMap, in the norm

@@ -56,8 +56,7 @@ std::optional<Eigen::Matrix3d> RowAtPoint(const Sources& sources,
                                           const Vector3d& xyz) {
   const Camera& camera = sources.model.cameras[geometry.camera];
   const Vector3d x_cam = geometry.cam_from_world * xyz;
-  const auto row =
-      RowAtProjection(camera.model_id, camera.params.data(), pixel, x_cam);
+  const auto row = RowAtProjection(camera, pixel, x_cam);
   const double rounding =
       1e-14 * (xyz.norm() + geometry.cam_from_world.translation.norm());
   if (!row || !(row->row(0).dot(x_cam) > rounding)) return std::nullopt;
@@ -69,10 +68,9 @@ std::optional<Eigen::Matrix3d> RowAtPixel(const Sources& sources,
                                           const ImageGeometry& geometry,
                                           const Eigen::Vector2d& pixel) {
   const Camera& camera = sources.model.cameras[geometry.camera];
-  const double* params = camera.params.data();
-  const auto bearing = PixelBearing(camera.model_id, params, pixel);
+  const auto bearing = PixelBearing(camera, pixel);
   if (!bearing) return std::nullopt;
-  return RowAtProjection(camera.model_id, params, pixel, *bearing);
+  return RowAtProjection(camera, pixel, *bearing);
 }
 
 // Fills the slots with the observations that have a pose and a row. The row is

@@ -305,8 +305,7 @@ class TrackError {
       const int32_t n = image_indices_.at(element.image_id);
       const Point2D& point2D = model_.images[n].points2D[element.point2D_idx];
       const Camera& camera = model_.cameras[images_[n].camera];
-      const auto error = ProjectionError(camera.model_id, camera.params.data(),
-                                         {point2D.x, point2D.y},
+      const auto error = ProjectionError(camera, {point2D.x, point2D.y},
                                          images_[n].cam_from_world * xyz);
       if (!error) return std::numeric_limits<double>::infinity();
       largest = std::max(largest, NormOf(*error, norm_));

@@ -11,6 +11,7 @@
 #include "krot/context.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
+#include "krot/model/derived_models.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 

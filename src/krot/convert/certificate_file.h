@@ -202,6 +202,8 @@ ConflictFile ParseConflicts(const std::string& json,
 ConflictVerdict VerifyConflictFile(const Model& model,
                                    const ConflictFile& file);
 
+// ---- The digest of a model ----
+
 // SHA-256, as 64 lower-case hexadecimal digits, of everything that a
 // certificate depends on: cameras, rotations, poses in rigs, and observations.
 // It does not depend on translations of frames and points, which a solver
@@ -211,6 +213,8 @@ std::string ModelSha256(const Model& model);
 
 // SHA-256 (FIPS 180-4) of any bytes, in the same digits; about 200 MB/s.
 std::string Sha256(std::string_view bytes);
+
+// ---- Baselines ----
 
 inline constexpr int kBaselineCertificateVersion = 1;
 

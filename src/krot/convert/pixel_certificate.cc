@@ -37,12 +37,12 @@ double LineAt(const Reprojection& reprojection, const BuiltProblem& built,
   if (!built.HasPixel(o.observation)) {
     return o.y.norm() / (o.lambda * (1 + kPositionSlack));
   }
-  const Reprojection::Source& source = reprojection.SourceOf(o.observation);
+  const Intrinsics& source = reprojection.SourceOf(o.observation);
   const double unit = rows.lower_bound * o.lambda;
   const double scale = built.ScaleOf(o.observation);
-  const std::optional<double> largest = SupportBound(
-      source.model_id, source.params, built.pixels[o.observation], bearings[n],
-      o.y / scale, scale * gamma, norm.p, sufficient * unit);
+  const std::optional<double> largest =
+      SupportBound(source, built.pixels[o.observation], bearings[n],
+                   o.y / scale, scale * gamma, norm.p, sufficient * unit);
   return largest ? *largest / unit : kInfinity;
 }
 
@@ -77,14 +77,13 @@ bool KeepsToItsSide(const Reprojection& reprojection, const BuiltProblem& built,
     return o.y.norm() + change.y <=
            o.lambda * (1 - change.depth) * (1 + kPositionSlack / 2);
   }
-  const Reprojection::Source& source = reprojection.SourceOf(o.observation);
+  const Intrinsics& source = reprojection.SourceOf(o.observation);
   const double gamma = certificate.lower_bound;
   // It need not be known more exactly than to a tenth: it only scales an
   // allowance for rounding.
-  const std::optional<double> kappa =
-      RemainderBound(source.model_id, source.params,
-                     built.pixels[o.observation], certificate.bearings[n],
-                     built.ScaleOf(o.observation) * gamma, norm.p, 0.1);
+  const std::optional<double> kappa = RemainderBound(
+      source, built.pixels[o.observation], certificate.bearings[n],
+      built.ScaleOf(o.observation) * gamma, norm.p, 0.1);
   if (!kappa) return false;
   // |L| <= sqrt(2) |L|_p over S_i; both sides are divided by the scale, of
   // which gamma is a bound.
@@ -124,9 +123,8 @@ std::vector<Eigen::Vector3d> BearingsOfPixels(const Model& model,
       bearings.push_back(ApexOfStart(built, o.observation));
       continue;
     }
-    const Reprojection::Source& source = reprojection.SourceOf(o.observation);
-    bearings.push_back(PixelBearing(source.model_id, source.params,
-                                    built.pixels[o.observation])
+    const Intrinsics& source = reprojection.SourceOf(o.observation);
+    bearings.push_back(PixelBearing(source, built.pixels[o.observation])
                            .value_or(Eigen::Vector3d::Zero()));
   }
   return bearings;
@@ -203,9 +201,9 @@ PixelCertificateCheck CheckPixelCertificate(const Model& model,
       }
       return refused("an apex is too near to its position, or too far");
     }
-    const Reprojection::Source& source = reprojection.SourceOf(i);
-    const auto row = RowAtProjection(source.model_id, source.params,
-                                     built.pixels[i], certificate.bearings[n]);
+    const Intrinsics& source = reprojection.SourceOf(i);
+    const auto row =
+        RowAtProjection(source, built.pixels[i], certificate.bearings[n]);
     if (!row) {
       return refused("the bearing of " + NameOf(model, built, i) +
                      " does not project");

@@ -278,7 +278,7 @@ Reprojection::Reprojection(const Model& model, const BuiltProblem& built)
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   for (const int32_t image : built.image_of) {
     const Camera& camera = model.cameras[geometries[image].camera];
-    sources_.push_back({camera.model_id, camera.params.data()});
+    sources_.emplace_back(camera);
     is_linear_ = is_linear_ && camera.model_id <= Pinhole::kId;
   }
 }
@@ -295,10 +295,10 @@ Eigen::Vector3d Reprojection::InCamera(const Estimate& estimate,
 double Reprojection::Error(const Estimate& estimate, Norm norm,
                            int64_t i) const {
   const Observation& o = built_.problem.observations[i];
-  const Source& source = sources_[o.view];
+  const Intrinsics& source = sources_[o.view];
   const Eigen::Vector3d x_cam = InCamera(estimate, i);
   const std::optional<Eigen::Vector2d> e =
-      ProjectionError(source.model_id, source.params, built_.pixels[i], x_cam);
+      ProjectionError(source, built_.pixels[i], x_cam);
   if (!e) return kInfinity;
   // What a change in the coordinates' last digits does to the error, pixels.
   // Coordinates are computed in a few operations. It is negligible unless a
@@ -338,9 +338,9 @@ bool Reprojection::TakeRows(const Estimate& estimate, int num_threads,
   ParallelForEach(count, num_threads, [&](int64_t i) {
     if (!built_.HasPixel(i)) return;
     Observation& observation = problem->observations[i];
-    const Source& source = sources_[observation.view];
-    const auto row = RowAtProjection(source.model_id, source.params,
-                                     built_.pixels[i], InCamera(estimate, i));
+    const Intrinsics& source = sources_[observation.view];
+    const auto row =
+        RowAtProjection(source, built_.pixels[i], InCamera(estimate, i));
     if (row) {
       observation.E = *row;
       observation.E.bottomRows<2>() /= built_.ScaleOf(i);
@@ -353,14 +353,13 @@ bool Reprojection::TakeRows(const Estimate& estimate, int num_threads,
 
 namespace {
 
-std::optional<Eigen::Matrix3d> OuterRow(const Reprojection::Source& source,
+std::optional<Eigen::Matrix3d> OuterRow(const Intrinsics& source,
                                         const Eigen::Vector2d& pixel, Norm norm,
                                         double level) {
-  const auto bearing = PixelBearing(source.model_id, source.params, pixel);
+  const auto bearing = PixelBearing(source, pixel);
   if (!bearing) return std::nullopt;
-  auto E = RowAtProjection(source.model_id, source.params, pixel, *bearing);
-  const auto kappa = RemainderBound(source.model_id, source.params, pixel,
-                                    *bearing, level, norm.p);
+  auto E = RowAtProjection(source, pixel, *bearing);
+  const auto kappa = RemainderBound(source, pixel, *bearing, level, norm.p);
   if (!E || !kappa) return std::nullopt;
   const double terms =
       E->bottomRows<2>().cwiseAbs().sum() + pixel.lpNorm<1>() + level;

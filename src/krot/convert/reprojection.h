@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/camera/camera_model.h"
 #include "krot/convert/build_problem.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"
@@ -135,11 +136,7 @@ class Reprojection {
                 KnownRotationProblem* problem) const;
 
   // The camera of observation i of the model.
-  struct Source {
-    int model_id;
-    const double* params;
-  };
-  const Source& SourceOf(int64_t i) const {
+  const Intrinsics& SourceOf(int64_t i) const {
     return sources_[built_.problem.observations[i].view];
   }
 
@@ -148,7 +145,7 @@ class Reprojection {
 
  private:
   const BuiltProblem& built_;
-  std::vector<Source> sources_;  // per view
+  std::vector<Intrinsics> sources_;  // per view
   bool is_linear_;
 };
 

@@ -142,6 +142,8 @@ struct ReplacedRotations {
 ReplacedRotations ReplaceRotations(const FileBytes& file, Model* model,
                                    const FileNote& note = {});
 
+// ---- Known distances ----
+
 // "a.jpg to b.jpg", "3D point 12 to 3D point 7".
 std::string NameOf(const Model& model, const KnownDistance& distance);
 

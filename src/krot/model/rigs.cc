@@ -52,8 +52,7 @@ std::vector<ImageGeometry> ImageGeometries(const Model& model) {
 
 std::optional<PixelRay> RayOf(const Camera& camera,
                               const Eigen::Vector2d& pixel) {
-  const auto undistorted =
-      UndistortPixel(camera.model_id, camera.params.data(), pixel);
+  const auto undistorted = UndistortPixel(camera, pixel);
   if (!undistorted) return std::nullopt;
   PixelRay ray;
   ray.ray = undistorted->u.homogeneous();

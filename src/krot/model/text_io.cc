@@ -186,15 +186,18 @@ void ReadRecords(const FileBytes& file, const Read& read,
 }  // namespace
 
 void ParseCamerasText(const FileBytes& file, Model* model) {
-  ReadRecords(file, &ReadCamera, &model->cameras);
+  const auto read = [](TextReader* reader) { return ReadCamera(reader); };
+  ReadRecords(file, read, &model->cameras);
 }
 
 void ParseRigsText(const FileBytes& file, Model* model) {
-  ReadRecords(file, &ReadRig, &model->rigs);
+  const auto read = [](TextReader* reader) { return ReadRig(reader); };
+  ReadRecords(file, read, &model->rigs);
 }
 
 void ParseFramesText(const FileBytes& file, Model* model) {
-  ReadRecords(file, &ReadFrame, &model->frames);
+  const auto read = [](TextReader* reader) { return ReadFrame(reader); };
+  ReadRecords(file, read, &model->frames);
 }
 
 void ParseImagesText(const FileBytes& file, Model* model) {

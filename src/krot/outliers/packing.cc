@@ -1,4 +1,4 @@
-#include "krot/outliers/conflict.h"
+#include "krot/outliers/removal.h"
 
 #include <algorithm>
 #include <numeric>

@@ -4,6 +4,8 @@
 #include <optional>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "krot/base/context.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/pixel_certificate.h"
@@ -120,5 +122,129 @@ OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
                             const std::vector<int64_t>& removed,
                             const Estimate& start, Norm norm,
                             const Context& context);
+
+// ---- Conflicts with what was removed ----
+
+// Where to look for a small conflict of an observation: in a few frames of its
+// track, among the points with the largest strain there. The strain of two rays
+// is by how much they miss each other, in pixels.
+class Neighbourhoods {
+ public:
+  // Keeps references. Cameras stand as in `estimate`.
+  Neighbourhoods(const KnownRotationProblem& problem, const Estimate& estimate);
+
+  // The sets of frames to look in, beside the frame of observation i. For
+  // num_others = 2 these are pairs of the most strained frames of its track,
+  // otherwise one set of up to eight. Only frames with free observations count.
+  std::vector<std::vector<int32_t>> FrameSets(
+      int64_t i, int num_others, const std::vector<char>& is_free) const;
+
+  // Observation i and the free observations, in its frame and the others, of
+  // its own point and of the most strained points that two of these frames see.
+  // Ascending.
+  std::vector<int64_t> Around(int64_t i, std::vector<int32_t> frames,
+                              const std::vector<char>& is_free) const;
+
+ private:
+  double Strain(int64_t i, int64_t j) const;
+  void AddStrained(int32_t a, int32_t b, const std::vector<char>& is_free,
+                   std::vector<int32_t>* points) const;
+
+  const KnownRotationProblem& problem_;
+  const Estimate& estimate_;
+  std::vector<std::vector<int32_t>> points_of_frame_;  // ascending
+};
+
+// No two conflicts may share an observation. So each should use observations
+// that others need least.
+
+// How dispensable each observation is, in [0, 1]: 0 if it is not free, less
+// than 1 if the track of an open observation has little else, otherwise 1.
+std::vector<float> Worths(const KnownRotationProblem& problem,
+                          const std::vector<char>& is_free,
+                          const std::vector<int64_t>& open);
+
+// Takes out of `open` the observations in crowded views, and returns them:
+// views that have fewer than two free observations for each open one, as a
+// conflict in two views needs. Both keep their order.
+std::vector<int64_t> TakeCrowded(const KnownRotationProblem& problem,
+                                 const std::vector<char>& is_free,
+                                 std::vector<int64_t>* open);
+
+// Where to look for the smallest conflict of an observation o: with two other
+// points in its image and one more, six observations in all.
+//
+// Of two views only the direction b of the baseline matters. Two observations
+// of a point within a bound are two narrow cones of rays, and allow a band of
+// directions: the hull of the one cone and the other reversed. Its edges are
+// great circles, two half-planes n'x <= c of the chart b = e + x around the
+// estimate's direction e. By Helly's theorem, if some bands have no common
+// direction, three of them have none. Where o excludes x = 0 and j, k do not,
+// these are three with lambda > 0 and
+//
+//   n_o + lambda_j n_j + lambda_k n_k = 0,
+//   c_o + lambda_j c_j + lambda_k c_k < 0.
+class TwoViewConflicts {
+ public:
+  // Keeps references. Cameras stand as in `estimate`; the bound is in pixels.
+  TwoViewConflicts(const KnownRotationProblem& problem,
+                   const Estimate& estimate, double max_error);
+
+  // Sets of observations, ascending, each with i, that conflict as far as this
+  // test tells; the most dispensable first. Observation i must be above the
+  // bound at the estimate. worth[j] in [0, 1] says how dispensable observation
+  // j is, 0: not to be used. Points in the middle of their bands count as more
+  // dispensable, so that those near an edge are left to observations that need
+  // them. O(observations of the views of i's track).
+  std::vector<std::vector<int64_t>> Candidates(
+      int64_t i, const std::vector<float>& worth) const;
+
+ private:
+  struct HalfPlane;
+  struct Candidate;
+  bool AppendBand(int64_t i, int64_t j, const Eigen::Vector3d& e,
+                  std::vector<HalfPlane>* planes) const;
+  void AppendTriples(const HalfPlane& violated,
+                     const std::vector<HalfPlane>& planes, float worth,
+                     std::vector<Candidate>* candidates) const;
+
+  const KnownRotationProblem& problem_;
+  const Estimate& estimate_;
+  const double max_error_;
+  std::vector<std::vector<int64_t>> observations_of_view_;  // ascending
+};
+
+// Conflicts that removed observations take part in.
+struct ConflictPacking {
+  std::vector<Conflict> conflicts;
+  bool is_complete = true;  // false: it ended at the limit of work
+};
+
+// Packs disjoint conflicts so that as many removed observations as possible
+// have one of their own: each charges a removed observation with others that
+// cannot be satisfied together with it. The removed observations with the
+// smallest errors come first, as they have the least choice. For each it looks
+//
+//   in its image alone and one other of its track, with the companions that
+//     others need least,
+//   in two others, then in all, among the observations there whose rays miss
+//     each other by most,
+//   and at last among the removal's tight observations,
+//
+// first among observations that are neither removed nor in a conflict, so that
+// removed ones do not share a conflict, then also among the removed ones that
+// found none. Small conflicts are preferred, as they leave more to others.
+//
+// Conflicts that are already `found`, which must be disjoint, stay and come
+// first.
+//
+// Where hardly anything can be decided, as with wrong rotations, it ends with
+// the conflicts so far once it has done `work_per_observation` (Work) for each
+// observation of the problem. An endoscope's model needs 1,300, most fewer than
+// 300.
+ConflictPacking PackAgainstRemoval(
+    const Model& model, const BuiltProblem& built, const ErrorBound& bound,
+    const Removal& removal, std::vector<Conflict> found, const Context& context,
+    int64_t work_per_observation = 1500);
 
 }  // namespace krot::internal

@@ -11,7 +11,6 @@
 #include "krot/base/numbers.h"
 #include "krot/convert/reprojection.h"
 #include "krot/model/derived_models.h"
-#include "krot/outliers/conflict.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/pipeline/stages.h"

@@ -37,7 +37,7 @@ struct Turn {
 
 class TurnFit {
  public:
-  TurnFit(const Reprojection::Source& source, const ErrorBound& bound,
+  TurnFit(const Intrinsics& source, const ErrorBound& bound,
           std::vector<Sighting> sightings)
       : source_(source), bound_(bound), sightings_(std::move(sightings)) {}
 
@@ -64,7 +64,7 @@ class TurnFit {
     return std::count_if(
         sightings_.begin(), sightings_.end(), [&](const Sighting& sighting) {
           const std::optional<Vector2d> e = ProjectionError(
-              source_.model_id, source_.params, sighting.pixel,
+              source_, sighting.pixel,
               turn.rotation * sighting.x_cam + turn.translation);
           return !e || !(NormOf(*e, bound_.norm) <= bound_.max_error);
         });
@@ -79,7 +79,7 @@ class TurnFit {
       const Vector3d turned = turn.rotation * sighting.x_cam;
       const Vector3d x = turned + turn.translation;
       const std::optional<Matrix3d> row =
-          RowAtProjection(source_.model_id, source_.params, sighting.pixel, x);
+          RowAtProjection(source_, sighting.pixel, x);
       if (!row) continue;
       const Vector3d wv = *row * x;
       const Vector2d e = wv.tail<2>() / wv[0];
@@ -104,7 +104,7 @@ class TurnFit {
     return -normal.ldlt().solve(gradient);
   }
 
-  const Reprojection::Source source_;
+  const Intrinsics source_;
   const ErrorBound bound_;
   const std::vector<Sighting> sightings_;
 };

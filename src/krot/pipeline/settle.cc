@@ -11,7 +11,6 @@
 #include "krot/base/parallel_for.h"
 #include "krot/convert/reprojection.h"
 #include "krot/pipeline/solve_model.h"
-#include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"

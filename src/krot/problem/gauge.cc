@@ -9,7 +9,6 @@
 #include "krot/base/numbers.h"
 #include "krot/geometry.h"
 #include "krot/geometry/transform.h"
-#include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 

@@ -6,6 +6,7 @@
 
 #include "krot/base/context.h"
 #include "krot/math/norm.h"
+#include "krot/problem/centre_unknowns.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {

@@ -79,6 +79,8 @@ Eigen::VectorXd Deviations(const Eigen::MatrixXd& covariance);
 // The names of a camera model's parameters: "f", "cx", "cy", "k".
 std::vector<std::string> ParamNames(int model_id);
 
+// ---- What is surveyed ----
+
 // Surveyed points and cameras, compared with those of a model.
 struct SurveyComparison {
   struct Place {

@@ -154,8 +154,7 @@ Eigen::Vector2d HalfExtent(const Camera& camera) {
   constexpr double kMin = 0.05;
   constexpr double kMax = 1.5;
   if (!FindCameraModel(camera.model_id)->has_image_plane) return {kMax, kMax};
-  const Eigen::Matrix2d J = ProjectionJacobian(
-      camera.model_id, camera.params.data(), Eigen::Vector2d::Zero());
+  const Eigen::Matrix2d J = ProjectionJacobian(camera, Eigen::Vector2d::Zero());
   const auto bounded = [&](double half_extent) {
     return std::isfinite(half_extent) ? std::clamp(half_extent, kMin, kMax)
                                       : kMax;

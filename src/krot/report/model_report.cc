@@ -52,23 +52,21 @@ NoiseFigures FiguresOf(const Model& model, const ModelNoise& noise) {
 
 }  // namespace
 
-ModelReport AnalyzeModel(const Model& model, int num_worst, int num_threads) {
-  const std::vector<double> errors_px = PixelErrors(model, num_threads);
+ModelReport AnalyzeModel(const Model& model, int num_worst) {
+  const std::vector<double> errors_px = PixelErrors(model);
   ModelReport report;
   report.colmap = ComputeColmapStatistics(model);
   report.pixel_error = Summarize(errors_px);
   report.images = ErrorsByImage(model, errors_px);
   report.cameras = ErrorsByCamera(model, errors_px);
   report.worst = WorstObservations(model, errors_px, num_worst);
-  Context context;
-  context.num_threads = num_threads;
-  report.noise = FiguresOf(model, EstimateNoise(model, {}, context));
+  report.noise = FiguresOf(model, EstimateNoise(model, {}, {}));
   report.track_lengths = TrackLengthHistogram(model);
   report.num_tracks_with_repeated_image = std::count_if(
       model.points3D.begin(), model.points3D.end(),
       [&](const Point3D& point) { return RepeatsAnImage(model, point); });
   report.depth = ComputeDepthStatistics(model);
-  report.triangulation_angle_deg = TriangulationAnglesDeg(model, num_threads);
+  report.triangulation_angle_deg = TriangulationAnglesDeg(model);
   return report;
 }
 

@@ -198,8 +198,7 @@ struct ModelReport {
 
 // Collects the figures of a model. Requires a valid model (ValidateModel) and
 // num_worst >= 0. O(sum of squared track lengths).
-ModelReport AnalyzeModel(const Model& model, int num_worst,
-                         int num_threads = -1);
+ModelReport AnalyzeModel(const Model& model, int num_worst);
 
 // For the terminal: COLMAP's figures under COLMAP's names, then KROT's. Of
 // cameras and images the `max_rows` with the largest errors.

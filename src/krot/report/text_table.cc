@@ -12,7 +12,7 @@ void TextTable::AddRow(std::vector<std::string> cells) {
   rows_.push_back(std::move(cells));
 }
 
-std::string TextTable::ToString(const std::string& indent) const {
+std::string TextTable::ToString() const {
   std::vector<size_t> widths;
   for (const std::vector<std::string>& row : rows_) {
     widths.resize(std::max(widths.size(), row.size()), 0);
@@ -22,7 +22,7 @@ std::string TextTable::ToString(const std::string& indent) const {
   }
   std::string text;
   for (const std::vector<std::string>& row : rows_) {
-    text += indent;
+    text += "  ";
     for (size_t column = 0; column < row.size(); ++column) {
       const std::string padding(widths[column] - row[column].size(), ' ');
       const bool is_last = column + 1 == row.size();

@@ -15,8 +15,8 @@ class TextTable {
   // Rows may have different lengths.
   void AddRow(std::vector<std::string> cells);
 
-  // Every line ends in '\n' and begins with `indent`.
-  std::string ToString(const std::string& indent = "  ") const;
+  // Every line is indented and ends in '\n'.
+  std::string ToString() const;
 
  private:
   std::vector<std::vector<std::string>> rows_;

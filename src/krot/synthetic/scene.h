@@ -108,6 +108,8 @@ Database DatabaseOf(const Model& model);
 Camera DefaultCamera(int model_id, uint64_t width, uint64_t height,
                      double focal_length);
 
+// ---- The steps of SynthesizeScene ----
+
 // Random numbers that are the same on every platform. The C++ standard fixes
 // the bits of the engine, but leaves the distributions to each library, so they
 // are implemented here.

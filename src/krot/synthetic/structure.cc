@@ -11,10 +11,9 @@
 namespace krot::internal {
 namespace {
 
-std::optional<Eigen::Vector2d> RayOf(const Camera& camera,
-                                     const Eigen::Vector2d& pixel) {
-  const auto undistorted =
-      UndistortPixel(camera.model_id, camera.params.data(), pixel);
+std::optional<Eigen::Vector2d> OnImagePlane(const Camera& camera,
+                                            const Eigen::Vector2d& pixel) {
+  const auto undistorted = UndistortPixel(camera, pixel);
   if (!undistorted) return std::nullopt;
   return undistorted->u;
 }
@@ -33,7 +32,7 @@ double MaxRayRadius(const Camera& camera) {
     for (const Eigen::Vector2d& pixel :
          {Eigen::Vector2d(x, 0), Eigen::Vector2d(x, height),
           Eigen::Vector2d(0, y), Eigen::Vector2d(width, y)}) {
-      const std::optional<Eigen::Vector2d> u = RayOf(camera, pixel);
+      const std::optional<Eigen::Vector2d> u = OnImagePlane(camera, pixel);
       CheckArgument(u.has_value(), "focal_length_factor",
                     camera.params[0] / std::max(width, height),
                     "large enough for every pixel to have a ray");
@@ -67,8 +66,7 @@ std::optional<Eigen::Vector2d> Imaging::Project(
   if (has_image_plane_ && x_cam.hnormalized().norm() > max_ray_radius_) {
     return std::nullopt;
   }
-  const Eigen::Vector2d pixel =
-      ProjectPoint(camera_.model_id, camera_.params.data(), x_cam).value();
+  const Eigen::Vector2d pixel = ProjectPoint(camera_, x_cam).value();
   const bool inside = (pixel.array() >= lower_.array()).all() &&
                       (pixel.array() <= upper_.array()).all();
   if (!inside) return std::nullopt;
@@ -83,10 +81,10 @@ std::optional<Eigen::Vector3d> Imaging::PointAt(int image,
   const Eigen::Vector2d pixel = lower_ + fraction.cwiseProduct(upper_ - lower_);
   std::optional<Eigen::Vector3d> ray;  // at depth 1
   if (has_image_plane_) {
-    const std::optional<Eigen::Vector2d> u = RayOf(camera_, pixel);
+    const std::optional<Eigen::Vector2d> u = OnImagePlane(camera_, pixel);
     if (u) ray = u->homogeneous();
   } else {
-    ray = PixelBearing(camera_.model_id, camera_.params.data(), pixel);
+    ray = PixelBearing(camera_, pixel);
   }
   if (!ray) return std::nullopt;
   const Eigen::Vector3d x_cam = depth * *ray;

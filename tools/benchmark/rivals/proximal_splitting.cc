@@ -1,7 +1,6 @@
 #include "tools/benchmark/rivals/proximal_splitting.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <ceres/tiny_solver.h>
 
