@@ -4,13 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 
 namespace krot::internal {
 namespace {
 
 constexpr int kPanorama = 17;
-constexpr double kPi = 3.14159265358979323846;
 
 // Longitude and latitude, the axis in the middle.
 Eigen::Vector2d ProjectToPanorama(const Camera& camera,
