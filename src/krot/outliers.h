@@ -48,11 +48,13 @@ struct Suspect {
 };
 
 // After a start from nothing: images that few tracks connect to the rest of the
-// model.
+// model, or those of a single frame that keeps few of its observations.
 struct WeakPart {
+  bool is_frame = false;  // a single one, which has no scale of its own
   std::vector<std::string> image_names;  // in the order of their ids
-  int64_t num_tracks = 0;  // tracks of the input that both sides see
-  // Of these, tracks that agree on one place and scale.
+  // Tracks of the input that both sides see; a frame's observations.
+  int64_t num_tracks = 0;
+  // Of these, tracks that agree on one place and scale; observations kept.
   int64_t num_agreeing = 0;
   // The part may be larger or smaller by this factor; >= 1.
   double scale_factor = 1;

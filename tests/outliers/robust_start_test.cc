@@ -160,12 +160,26 @@ TEST(FindParts, CutsWhereFewTracksCross) {
   }
 }
 
+// 30 images along a path, tracks of three.
+SyntheticScene ShortTracks(double outlier_ratio, uint64_t seed) {
+  SceneOptions options = Scene(outlier_ratio, 0);
+  options.layout = SceneLayout::kStreet;
+  options.num_frames = 30;
+  options.num_points = 1800;
+  options.track_length = 3;
+  options.random_seed = seed;
+  return SynthesizeScene(options);
+}
+
 TEST(FindParts, LeavesWholeWhatManyTracksHold) {
   for (const SceneLayout layout : {SceneLayout::kOrbit, SceneLayout::kStreet}) {
     const std::vector<int32_t> parts =
         FindParts(ProblemOf(SynthesizeScene(SceneInParts(layout)).model), {});
     EXPECT_EQ(parts, std::vector<int32_t>(24, 0));
   }
+  // Hardly any track is seen by two frames on either side of a cut.
+  EXPECT_EQ(FindParts(ProblemOf(ShortTracks(0, 1).model), {}),
+            std::vector<int32_t>(30, 0));
 }
 
 TEST(Groups, ShareTheTracksThatFramesOfBothSee) {
@@ -200,7 +214,7 @@ TEST(Groups, ShareTheTracksThatFramesOfBothSee) {
       shared[{a, b}] = strength;
     }
     EXPECT_EQ(shared, expected);
-    const std::vector<Groups::Count> counts = groups.Counts(true);
+    const std::vector<Groups::Count> counts = groups.Counts();
     for (int32_t f = 0; f < problem.num_frames; ++f) {
       EXPECT_EQ(counts[f].num_tracks, num_tracks[f]);
     }
@@ -228,6 +242,29 @@ TEST(FindRobustStart, HoldsTheScaleOfPartsThatTenTracksJoinHalfOfThemWrong) {
           << ties.num_parts << " parts, " << num_wrong << " wrong";
     }
   }
+}
+
+// A point can go wherever a single camera sees it.
+TEST(NumAgreeing, DoesNotCountWhatAgreesWithNoOtherObservation) {
+  const BuiltProblem built =
+      BuildProblem(SynthesizeScene(Scene(0, 0)).ground_truth, {});
+  const KnownRotationProblem& problem = built.problem;
+  const auto all = static_cast<int64_t>(problem.observations.size());
+  const auto num_agreeing = [&](const Estimate& estimate) {
+    return NumAgreeing(problem, estimate, Norm::L2(), /*cap=*/8);
+  };
+  EXPECT_EQ(num_agreeing(built.start), all);
+  Estimate moved = built.start;
+  const AffineMap first =
+      CamFromWorld(problem.views[problem.observations[0].view],
+                   moved.translations[problem.FrameOf(0)]);
+  const Eigen::Vector3d centre =
+      -first.leftCols<3>().transpose() * first.col(3);
+  moved.points[0] = centre + 3 * (moved.points[0] - centre);
+  EXPECT_LT(ResidualOf(ViewPoint(problem, problem.observations[0], moved),
+                       Norm::L2()),
+            8);
+  EXPECT_EQ(num_agreeing(moved), all - problem.point_begin[1]);
 }
 
 // 200 images along a path.
@@ -283,17 +320,6 @@ TEST(FindWeakLinks, SaysThatTracksLeftOutHoldNothing) {
   EXPECT_FALSE(links[0].IsHeld());
   EXPECT_EQ(links[0].frames.size(), 12u);
   EXPECT_GT(links[0].scale_factor, 5);
-}
-
-// 30 images along a path, tracks of three.
-SyntheticScene ShortTracks(double outlier_ratio, uint64_t seed) {
-  SceneOptions options = Scene(outlier_ratio, 0);
-  options.layout = SceneLayout::kStreet;
-  options.num_frames = 30;
-  options.num_points = 1800;
-  options.track_length = 3;
-  options.random_seed = seed;
-  return SynthesizeScene(options);
 }
 
 // A fifth of the tracks has no wrong observation.
@@ -360,6 +386,28 @@ void TurnPart(const std::function<bool(int)>& is_turned, double degrees,
       Pose& of_frame = model->frames[n].rig_from_world;
       of_frame = turned(of_frame);
     }
+  }
+}
+
+TEST(FilterOutliers, NamesTheFramesThatKeepFewOfTheirObservations) {
+  for (const std::set<int>& turned : {std::set<int>{}, {4}, {2, 11, 19}}) {
+    Model model =
+        Wiped(SynthesizeScene(SceneInParts(SceneLayout::kOrbit)).model);
+    TurnPart([&](int n) { return turned.count(n) > 0; }, 40, &model);
+    OutlierFilterOptions options;
+    options.find_conflicts = false;
+    const OutlierFilterResult result = FilterOutliers(model, options, {});
+    std::set<int> found;
+    for (const WeakPart& part : result.summary.weak_parts) {
+      EXPECT_TRUE(part.is_frame);
+      EXPECT_FALSE(part.is_held);
+      EXPECT_LT(part.num_agreeing, part.num_tracks / 2);
+      ASSERT_EQ(part.image_names.size(), 1u);
+      for (int n = 0; n < 24; ++n) {
+        if (model.images[n].name == part.image_names[0]) found.insert(n);
+      }
+    }
+    EXPECT_EQ(found, turned);
   }
 }
 

@@ -1,6 +1,7 @@
 #include "krot/outliers/outlier_filter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -109,15 +110,19 @@ class OutlierFilter : private Filtering {
     Model moved;
     PlaceAt(built, *removal, &moved);
     Solve(std::move(moved));
-    if (start.init == SolveInit::kFeasible && !context_.IsCancelled()) {
-      FindWeakParts(built);
-    }
     // Observations that had no part in the problem may still be above the
     // bound.
-    if (!RemoveAbove()) return;
-    std::vector<char> is_gone;
-    for (const uint64_t e : kept_.element_of) is_gone.push_back(is_removed_[e]);
-    RemoveMore(is_gone);
+    if (RemoveAbove()) {
+      std::vector<char> is_gone;
+      for (const uint64_t e : kept_.element_of) {
+        is_gone.push_back(is_removed_[e]);
+      }
+      RemoveMore(is_gone);
+    }
+    if (start.init == SolveInit::kFeasible && !context_.IsCancelled()) {
+      FindWeakParts(built);
+      FindLooseFrames(built);
+    }
   }
 
   // Whether all observations can be within the bound that noise has chosen. If
@@ -281,21 +286,11 @@ class OutlierFilter : private Filtering {
       estimate.translations[f] =
           kept_.model.frames[built.frame_of[f]].rig_from_world.translation;
     }
-    std::vector<char> kept;
-    for (const uint64_t e : ElementsOf(model_, built)) {
-      kept.push_back(!is_removed_[e]);
-    }
     for (const WeakLink& link :
-         FindWeakLinks(built.problem, estimate, kept,
+         FindWeakLinks(built.problem, estimate, AreKept(built),
                        kCapOfPoints * std::min(bound_.max_error, kLevelOfStart),
                        context_)) {
-      WeakPart& part = summary_.weak_parts.emplace_back();
-      for (size_t v = 0; v < built.image_of.size(); ++v) {
-        if (std::binary_search(link.frames.begin(), link.frames.end(),
-                               built.problem.views[v].frame)) {
-          part.image_names.push_back(model_.images[built.image_of[v]].name);
-        }
-      }
+      WeakPart& part = AddWeakPart(built, link.frames);
       part.num_tracks = link.num_tracks;
       part.num_agreeing = link.num_agreeing;
       part.scale_factor = link.scale_factor;
@@ -303,6 +298,57 @@ class OutlierFilter : private Filtering {
       part.turn_deg = link.turn_deg;
       part.num_agreeing_turned = link.num_agreeing_turned;
     }
+  }
+
+  // Adds single frames that keep less than half of the usual share of their
+  // observations, and fewer than chance explains (four standard deviations).
+  void FindLooseFrames(const BuiltProblem& built) {
+    const KnownRotationProblem& problem = built.problem;
+    const std::vector<char> kept = AreKept(built);
+    const double usual =
+        static_cast<double>(std::count(kept.begin(), kept.end(), 1)) /
+        static_cast<double>(kept.size());
+    for (int32_t f = 0; f < problem.num_frames; ++f) {
+      int64_t num_kept = 0;
+      for (const int32_t i : problem.OfFrame(f)) num_kept += kept[i];
+      const int64_t num_seen =
+          problem.frame_begin[f + 1] - problem.frame_begin[f];
+      const double expected = usual * static_cast<double>(num_seen);
+      const double missing = expected - static_cast<double>(num_kept);
+      if (2 * missing <= expected ||
+          missing <= 4 * std::sqrt((1 - usual) * expected)) {
+        continue;
+      }
+      WeakPart& part = AddWeakPart(built, {f});
+      part.is_frame = true;
+      part.num_tracks = num_seen;
+      part.num_agreeing = num_kept;
+      part.is_held = false;
+    }
+  }
+
+  // Whether each observation of the problem is left in the solved model.
+  std::vector<char> AreKept(const BuiltProblem& built) const {
+    std::vector<char> is_left(model_.track_elements.size(), 0);
+    for (const uint64_t e : kept_.element_of) is_left[e] = 1;
+    std::vector<char> kept;
+    for (const uint64_t e : ElementsOf(model_, built)) {
+      kept.push_back(is_left[e]);
+    }
+    return kept;
+  }
+
+  // `frames` must ascend.
+  WeakPart& AddWeakPart(const BuiltProblem& built,
+                        const std::vector<int32_t>& frames) {
+    WeakPart& part = summary_.weak_parts.emplace_back();
+    for (size_t v = 0; v < built.image_of.size(); ++v) {
+      if (std::binary_search(frames.begin(), frames.end(),
+                             built.problem.views[v].frame)) {
+        part.image_names.push_back(model_.images[built.image_of[v]].name);
+      }
+    }
+    return part;
   }
 
   ErrorBound bound_;

@@ -75,7 +75,7 @@ std::vector<GroupPair> Groups::Pairs() const {
   return pairs;
 }
 
-std::vector<Groups::Count> Groups::Counts(bool compares_scales) const {
+std::vector<Groups::Count> Groups::Counts() const {
   std::vector<Count> counts(sizes_.size());
   for (size_t k = 0; k + 1 < begin_.size(); ++k) {
     int32_t num_frames = 0;
@@ -88,7 +88,7 @@ std::vector<Groups::Count> Groups::Counts(bool compares_scales) const {
       counts[group].num_located += others >= 2;
       if (own < std::min(2, sizes_[group])) continue;
       ++counts[group].num_tracks;
-      counts[group].num_shared += others >= (compares_scales ? 2 : 1);
+      counts[group].num_shared += others >= 1;
     }
   }
   return counts;
@@ -150,14 +150,14 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
   Groups groups(problem, part_of);
   for (bool goes_on = true; goes_on;) {
     const std::vector<int32_t>& sizes = groups.sizes();
-    const std::vector<Groups::Count> counts =
-        groups.Counts(options.compares_scales);
+    const std::vector<Groups::Count> counts = groups.Counts();
     const auto is_open = [&](int32_t group) {
       const auto [num_tracks, num_shared, num_located] = counts[group];
       const bool is_loose =
           num_tracks < options.min_tracks && num_tracks < num_located;
       return sizes[group] == 1 || is_loose ||
              (num_shared >= options.min_tracks &&
+              (!options.compares_scales || num_located >= options.min_tracks) &&
               static_cast<double>(num_shared) >=
                   options.min_share * static_cast<double>(num_tracks));
     };

@@ -50,16 +50,13 @@ class Groups {
   // All pairs of groups a < b that share tracks; their strength is the number
   // of these. O(sum over tracks of their squared numbers of groups).
   std::vector<GroupPair> Pairs() const;
-  // Per group: the tracks that two of its frames see, or its only frame; and of
-  // these the tracks that frames of other groups see, too: at least two such
-  // frames if scales are to be compared, otherwise one.
+  // Per group.
   struct Count {
-    int64_t num_tracks = 0;
-    int64_t num_shared = 0;
-    // Tracks of the group, even of one frame, that two others see.
-    int64_t num_located = 0;
+    int64_t num_tracks = 0;   // that two of its frames see, or its only frame
+    int64_t num_shared = 0;   // of these, those that others see, too
+    int64_t num_located = 0;  // of all its tracks, those that two others see
   };
-  std::vector<Count> Counts(bool compares_scales) const;
+  std::vector<Count> Counts() const;
   // The number of frames of each group.
   const std::vector<int32_t>& sizes() const { return sizes_; }
 
@@ -82,8 +79,8 @@ void SortStrongestFirst(std::vector<GroupPair>* pairs);
 inline constexpr int64_t kStrongTracks = 50;
 struct PartOptions {
   int64_t min_tracks = kStrongTracks;  // that it shares with others
-  // Whether only tracks count that two frames of the group and two others see,
-  // as only these compare the scales.
+  // Whether so many of its tracks, even of one frame, have to be located by
+  // others, too: only tracks of both kinds compare the scales.
   bool compares_scales = true;
   double min_share = 0;  // the share of its tracks that it shares
 };
@@ -150,9 +147,9 @@ class PlaceSearch {
         variance_(sigma * sigma),
         tracks_(std::move(tracks)) {}
 
-  // The best of the places that pairs of tracks with points on either side
-  // propose; none if there are too few such tracks.
-  std::optional<Place> Propose() const;
+  // The best of the places that pairs of tracks propose, for a scale of about
+  // `scale`; none if there are too few tracks.
+  std::optional<Place> Propose(double scale) const;
   // The same with a rotation, which three tracks propose; for few tracks, too.
   std::optional<Place> ProposeTurned() const;
   // Infinite if it is `limit` or more.
@@ -160,7 +157,7 @@ class PlaceSearch {
               double limit = std::numeric_limits<double>::infinity()) const {
     double sum = 0;
     for (const SharedTrack& track : tracks_) {
-      sum += std::min(BestPoint(track, place).second, kCutOff * variance_);
+      sum += BestPoint(track, place).second;
       if (sum >= limit) return std::numeric_limits<double>::infinity();
     }
     return sum;
@@ -184,20 +181,29 @@ class PlaceSearch {
         ResidualOf(ViewPoint(cameras_[o.view], o, x), Norm::L2());
     return error * error;
   }
+  // At most `limit`: no more is added once that is reached.
   double CostAt(const SharedTrack& track, const Place& place,
-                const Eigen::Vector3d& x) const {
+                const Eigen::Vector3d& x, double limit) const {
     double sum = -track.a.sum - track.b.sum;
+    for (const int64_t i : track.a.observations) {
+      sum += SquaredError(i, x);
+      if (!(sum < limit)) return limit;
+    }
     const Eigen::Vector3d x_b =
         place.rotation.transpose() * (x - place.shift) / place.scale;
-    for (const int64_t i : track.a.observations) sum += SquaredError(i, x);
-    for (const int64_t i : track.b.observations) sum += SquaredError(i, x_b);
+    for (const int64_t i : track.b.observations) {
+      sum += SquaredError(i, x_b);
+      if (!(sum < limit)) return limit;
+    }
     return std::max(sum, 0.0);
   }
   std::pair<Eigen::Vector3d, double> BestPoint(const SharedTrack& track,
                                                const Place& place) const;
   std::vector<const SharedTrack*> TracksWithPoints() const;
+  static Eigen::Matrix3d WeightOf(const SharedTrack& track, double scale);
   Place BestPlace(double scale) const;
-  Place Improve(const Place& place) const;
+  Place Improve(const Place& place, bool is_scale_free) const;
+  Place ImproveAll(Place place, bool is_scale_free) const;
 
   const KnownRotationProblem& problem_;
   const std::vector<AffineMap> cameras_;  // each in its group's coordinates

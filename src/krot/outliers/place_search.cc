@@ -14,14 +14,19 @@ namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
+using Eigen::Matrix4d;
 using Eigen::Vector3d;
+using Eigen::Vector4d;
+using Matrix34d = Eigen::Matrix<double, 3, 4>;
 
 // About so many pairs or triples of tracks are tried for a place and a scale.
 constexpr int64_t kProposals = 300;
 
 // M^-1, where M may be singular.
-Matrix3d InverseOf(const Matrix3d& M) {
-  return (M + 1e-9 * M.trace() * Matrix3d::Identity()).inverse();
+template <int kSize>
+Eigen::Matrix<double, kSize, kSize> InverseOf(
+    const Eigen::Matrix<double, kSize, kSize>& M) {
+  return (M + 1e-9 * M.trace() * M.Identity()).inverse();
 }
 
 }  // namespace
@@ -45,27 +50,28 @@ Normal NormalOf(const KnownRotationProblem& problem,
   return normal;
 }
 
-// The point of a track with the lowest cost: either group's, or the one that
-// both agree on best.
+// The point of a track with the lowest cost, which is kCutOff variance_ at
+// most: either group's, or the one that both agree on best.
 std::pair<Vector3d, double> PlaceSearch::BestPoint(const SharedTrack& track,
                                                    const Place& place) const {
   const Vector3d x_b = place.scale * (place.rotation * track.b.x) + place.shift;
   const Matrix3d& H_a = track.a.H;
   const Matrix3d H_b = place.rotation * track.b.H * place.rotation.transpose() /
                        (place.scale * place.scale);
-  const Vector3d both = InverseOf(H_a + H_b) * (H_a * track.a.x + H_b * x_b);
-  std::pair<Vector3d, double> best = {both, CostAt(track, place, both)};
-  for (const Vector3d& x : {track.a.x, x_b}) {
-    const double cost = CostAt(track, place, x);
+  const Vector3d both = InverseOf<3>(H_a + H_b) * (H_a * track.a.x + H_b * x_b);
+  std::pair<Vector3d, double> best = {both, kCutOff * variance_};
+  for (const Vector3d& x : {both, track.a.x, x_b}) {
+    const double cost = CostAt(track, place, x, best.second);
     if (cost < best.second) best = {x, cost};
   }
   return best;
 }
 
-// A step of Gauss-Newton in the shift and the points of the tracks that agree.
-Place PlaceSearch::Improve(const Place& place) const {
-  Matrix3d S = Matrix3d::Zero();
-  Vector3d rhs = Vector3d::Zero();
+// A step of Gauss-Newton in the shift, the points of the tracks that agree and,
+// if it is free, the scale.
+Place PlaceSearch::Improve(const Place& place, bool is_scale_free) const {
+  Matrix4d S = Matrix4d::Zero();  // shift, scale
+  Vector4d rhs = Vector4d::Zero();
   for (const SharedTrack& track : tracks_) {
     const auto [x, cost] = BestPoint(track, place);
     if (!(cost < kCutOff * variance_)) continue;
@@ -74,26 +80,40 @@ Place PlaceSearch::Improve(const Place& place) const {
         NormalOf(problem_, cameras_, track.b, (x - place.shift) / place.scale);
     b.H /= place.scale * place.scale;
     b.g /= place.scale;
-    const Matrix3d H_b_M = b.H * InverseOf(a.H + b.H);
-    S += b.H - H_b_M * b.H;
-    rhs += b.g - H_b_M * (a.g + b.g);
+    const Matrix3d H_b_M = b.H * InverseOf<3>(a.H + b.H);
+    Matrix34d moves = Matrix34d::Identity();
+    moves.col(3) = (x - place.shift) / place.scale;
+    S += moves.transpose() * (b.H - H_b_M * b.H) * moves;
+    rhs += moves.transpose() * (b.g - H_b_M * (a.g + b.g));
   }
   Place moved = place;
-  moved.shift += InverseOf(S) * rhs;
+  if (is_scale_free) {
+    const Vector4d step = InverseOf(S) * rhs;
+    moved.shift += step.head<3>();
+    moved.scale += step(3);
+    if (!(moved.scale > 0)) return place;
+  } else {
+    moved.shift += InverseOf<3>(S.topLeftCorner<3, 3>()) * rhs.head<3>();
+  }
   moved.cost = Cost(moved, place.cost);
   return moved;
 }
 
 // For every track (t - x_a + scale x_b)' W (...) is to be small, with t the
-// shift and W^-1 = H_a^-1 + H_b^-1; two tracks determine t.
+// shift and W^-1 = H_a^-1 + scale^2 H_b^-1; two tracks determine t, and the
+// scale, too, which W hardly depends on.
+Matrix3d PlaceSearch::WeightOf(const SharedTrack& track, double scale) {
+  const Matrix3d& H_a = track.a.H;
+  return H_a - H_a * InverseOf<3>(H_a + track.b.H / (scale * scale)) * H_a;
+}
+
 Place PlaceSearch::BestPlace(double scale) const {
   const auto count = static_cast<int64_t>(tracks_.size());
   std::vector<Normal> of_shift(tracks_.size());
   for (size_t j = 0; j < tracks_.size(); ++j) {
-    const Side& a = tracks_[j].a;
-    const Side& b = tracks_[j].b;
-    of_shift[j].H = a.H - a.H * InverseOf(a.H + b.H / (scale * scale)) * a.H;
-    of_shift[j].g = of_shift[j].H * (a.x - scale * b.x);
+    const SharedTrack& track = tracks_[j];
+    of_shift[j].H = WeightOf(track, scale);
+    of_shift[j].g = of_shift[j].H * (track.a.x - scale * track.b.x);
   }
   Place best;
   best.scale = scale;
@@ -104,14 +124,18 @@ Place PlaceSearch::BestPlace(double scale) const {
       if (pair % stride != 0) continue;
       Place place;
       place.scale = scale;
-      place.shift = InverseOf(of_shift[i].H + of_shift[j].H) *
+      place.shift = InverseOf<3>(of_shift[i].H + of_shift[j].H) *
                     (of_shift[i].g + of_shift[j].g);
       place.cost = Cost(place, best.cost);
       if (place.cost < best.cost) best = place;
     }
   }
+  return ImproveAll(best, /*is_scale_free=*/false);
+}
+
+Place PlaceSearch::ImproveAll(Place best, bool is_scale_free) const {
   for (int n = 0; n < 5; ++n) {
-    const Place moved = Improve(best);
+    const Place moved = Improve(best, is_scale_free);
     if (!(moved.cost < best.cost)) break;
     best = moved;
   }
@@ -158,25 +182,31 @@ std::optional<Place> PlaceSearch::ProposeTurned() const {
   return best;
 }
 
-std::optional<Place> PlaceSearch::Propose() const {
-  const std::vector<const SharedTrack*> tracks = TracksWithPoints();
-  const auto count = static_cast<int64_t>(tracks.size());
-  if (count < kStrongTracks) return std::nullopt;
+std::optional<Place> PlaceSearch::Propose(double scale) const {
+  const auto count = static_cast<int64_t>(tracks_.size());
+  if (count < 2) return std::nullopt;
+  std::vector<Matrix4d> S(tracks_.size());  // shift, scale
+  std::vector<Vector4d> rhs(tracks_.size());
+  for (size_t j = 0; j < tracks_.size(); ++j) {
+    Matrix34d moves = Matrix34d::Identity();
+    moves.col(3) = tracks_[j].b.x;
+    const Eigen::Matrix<double, 4, 3> weighed =
+        moves.transpose() * WeightOf(tracks_[j], scale);
+    S[j] = weighed * moves;
+    rhs[j] = weighed * tracks_[j].a.x;
+  }
   Place best;
   ForSomePairs(count, kProposals, [&](int64_t i, int64_t j) {
-    const Vector3d between_a = tracks[i]->a.x - tracks[j]->a.x;
-    const Vector3d between_b = tracks[i]->b.x - tracks[j]->b.x;
+    const Vector4d fit = InverseOf<4>(S[i] + S[j]) * (rhs[i] + rhs[j]);
     Place place;
-    place.scale = between_a.dot(between_b) / between_b.squaredNorm();
+    place.scale = fit(3);
+    place.shift = fit.head<3>();
     if (!(place.scale > 0) || !std::isfinite(place.scale)) return;
-    place.shift = (tracks[i]->a.x + tracks[j]->a.x -
-                   place.scale * (tracks[i]->b.x + tracks[j]->b.x)) /
-                  2;
     place.cost = Cost(place, best.cost);
     if (place.cost < best.cost) best = place;
   });
   if (!std::isfinite(best.cost)) return std::nullopt;
-  return best;
+  return ImproveAll(best, /*is_scale_free=*/true);
 }
 
 std::vector<Place> PlaceSearch::Profile(const std::vector<double>& scales,

@@ -80,7 +80,8 @@ struct Agreement {
   Agreement(const KnownRotationProblem& problem, const Estimate& estimate,
             Norm norm, double cap);
 
-  std::vector<char> agrees;  // per observation
+  // Per observation, whether it and another one of its track agree.
+  std::vector<char> agrees;
   int64_t num_agreeing = 0;
   // Frames that disagree with most of what they see of the others' points.
   std::vector<int32_t> loose_frames;
@@ -92,11 +93,20 @@ Agreement::Agreement(const KnownRotationProblem& problem,
     : agrees(problem.observations.size()), is_placed(problem.num_points, 0) {
   const auto count = static_cast<int64_t>(agrees.size());
   std::vector<int64_t> num_of_frame(problem.num_frames, 0);
-  for (int64_t i = 0; i < count; ++i) {
-    const Observation& o = problem.observations[i];
-    agrees[i] = ResidualOf(ViewPoint(problem, o, estimate), norm) <= cap;
-    num_agreeing += agrees[i];
-    num_of_frame[problem.FrameOf(i)] += agrees[i];
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    std::vector<int64_t> own;
+    for (const int64_t i : problem.OfPoint(k)) {
+      const Observation& o = problem.observations[i];
+      if (ResidualOf(ViewPoint(problem, o, estimate), norm) <= cap) {
+        own.push_back(i);
+      }
+    }
+    if (own.size() < 2) continue;
+    num_agreeing += static_cast<int64_t>(own.size());
+    for (const int64_t i : own) {
+      agrees[i] = 1;
+      ++num_of_frame[problem.FrameOf(i)];
+    }
   }
   // Loose: less than half of the share that agrees everywhere.
   std::vector<char> is_loose(problem.num_frames);
@@ -117,10 +127,15 @@ Agreement::Agreement(const KnownRotationProblem& problem,
 
 }  // namespace
 
-void MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
+int64_t NumAgreeing(const KnownRotationProblem& problem,
+                    const Estimate& estimate, Norm norm, double cap) {
+  return Agreement(problem, estimate, norm, cap).num_agreeing;
+}
+
+bool MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
                      double level, const Context& context, Estimate* estimate) {
   MinimizeRobustly(problem, context, estimate);
-  for (int n = 0; n < 8 && !context.IsCancelled(); ++n) {
+  for (int n = 0;; ++n) {
     const double cap =
         kCapOfPoints * std::max(level, MedianError(problem, *estimate, norm));
     const Agreement now(problem, *estimate, norm, cap);
@@ -130,13 +145,15 @@ void MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
       move(&moved);
       MinimizeRobustly(problem, context, &moved);
       const int64_t gain =
-          Agreement(problem, moved, norm, cap).num_agreeing - now.num_agreeing;
+          NumAgreeing(problem, moved, norm, cap) - now.num_agreeing;
       if (gain > 0) *estimate = std::move(moved);
       return 1000 * gain > now.num_agreeing;
     };
     const std::vector<int32_t> part_of = FindParts(problem, now.agrees, {});
     const bool is_whole =
         *std::max_element(part_of.begin(), part_of.end()) == 0;
+    const bool is_tied = is_whole && now.loose_frames.empty();
+    if (is_tied || n == 8 || context.IsCancelled()) return is_tied;
     if (!is_whole && helps([&](Estimate* moved) {
           PlaceParts(problem, part_of, norm, level, context, {}, moved);
         })) {
@@ -146,7 +163,7 @@ void MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
           PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
                               kCapOfPoints * level, context, moved);
         })) {
-      return;
+      return false;
     }
   }
 }

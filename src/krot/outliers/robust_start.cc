@@ -249,15 +249,17 @@ Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
   return estimate;
 }
 
-Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
-                          double level, const Context& context) {
+// The start of parts that share few of their tracks; none if there is only one.
+std::optional<Estimate> StartOfParts(const KnownRotationProblem& problem,
+                                     Norm norm, double level,
+                                     const Context& context) {
   PartOptions options;
   options.min_tracks = 1;
   options.compares_scales = false;
   options.min_share = 0.2;
   const std::vector<int32_t> part_of = FindParts(problem, options);
   if (*std::max_element(part_of.begin(), part_of.end()) == 0) {
-    return StartOfPart(problem, norm, level, context);
+    return std::nullopt;
   }
   Estimate estimate = AllAtZero(problem);
   PlaceParts(
@@ -271,6 +273,21 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
   return estimate;
 }
 
+Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
+                          double level, const Context& context) {
+  Estimate whole = StartOfPart(problem, norm, level, context);
+  if (MinimizeAndJoin(problem, norm, level, context, &whole)) return whole;
+  std::optional<Estimate> of_parts =
+      StartOfParts(problem, norm, level, context);
+  if (!of_parts) return whole;
+  MinimizeAndJoin(problem, norm, level, context, &*of_parts);
+  const auto num_agreeing = [&](const Estimate& estimate) {
+    return NumAgreeing(problem, estimate, norm, kCapOfPoints * level);
+  };
+  const bool is_better = num_agreeing(*of_parts) > num_agreeing(whole);
+  return std::move(is_better ? *of_parts : whole);
+}
+
 }  // namespace
 
 Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
@@ -278,9 +295,8 @@ Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
   Estimate estimate = AllAtZero(problem);
   for (std::vector<int64_t>& component : SplitIntoComponents(problem)) {
     const ProblemSubset part(problem, std::move(component));
-    Estimate own = StartOfComponent(part.problem(), norm, level, context);
-    MinimizeAndJoin(part.problem(), norm, level, context, &own);
-    part.Replace(own, &estimate);
+    part.Replace(StartOfComponent(part.problem(), norm, level, context),
+                 &estimate);
   }
   return estimate;
 }

@@ -75,7 +75,9 @@ Eigen::Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i);
 //      (finish/least_squares.h) and are joined;
 //   6. all move to such a minimum. Tracks that disagree hold nothing there, so
 //      what the others do not tie is joined anew, and frames that hardly agree
-//      are placed anew, while that makes more observations agree.
+//      are placed anew, while that makes more observations agree;
+//   7. if parts are left that nothing ties, all is placed as one part, too, and
+//      the start with which more observations agree is taken.
 //
 // Errors above `level`, pixels, count as wrong there. Depths are positive but
 // for those of outliers.
@@ -98,8 +100,14 @@ void PlaceParts(const KnownRotationProblem& problem,
 // MinimizeRobustly for a connected problem. As tracks that cost more than a
 // bound hold nothing, frames may have run away from the others there, alone or
 // in parts: they are placed anew, as long as more observations agree then.
-void MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
+// Returns whether what agrees ties all frames in the end.
+bool MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
                      double level, const Context& context, Estimate* estimate);
+
+// How many observations agree with another one of their tracks: their errors
+// are at most `cap`, pixels. O(observations).
+int64_t NumAgreeing(const KnownRotationProblem& problem,
+                    const Estimate& estimate, Norm norm, double cap);
 
 // The median error of an estimate, pixels; that of a point behind its camera is
 // infinite. 0 without observations. O(observations).

@@ -180,7 +180,8 @@ std::string OutlierCsv(const OutlierFilterSummary& summary) {
 
 Json WeakPartsJson(const OutlierFilterSummary& summary) {
   return ListJson(summary.weak_parts, [&](const WeakPart& part) -> Json {
-    return {{"image_names", part.image_names},
+    return {{"is_frame", part.is_frame},
+            {"image_names", part.image_names},
             {"num_tracks", part.num_tracks},
             {"num_agreeing", part.num_agreeing},
             {"scale_factor", FiniteOrNull(part.scale_factor)},

@@ -40,6 +40,29 @@ std::string WeakPartWords(const WeakPart& part) {
               : std::string());
 }
 
+// For example "2 images keep few of their observations (P7.JPG 3 of 120, P9.JPG
+// 0 of 88): look at their rotations and matches, or leave them out"; the first
+// five are named. "" without such parts.
+std::string LooseFrameWords(const std::vector<WeakPart>& parts) {
+  int64_t count = 0;
+  std::string names;
+  for (const WeakPart& part : parts) {
+    if (!part.is_frame) continue;
+    if (++count > 5) continue;
+    names += (names.empty() ? "" : ", ") + part.image_names.front() + " " +
+             std::to_string(part.num_agreeing) + " of " +
+             std::to_string(part.num_tracks);
+  }
+  if (count == 0) return "";
+  if (count > 5) names += ", ...";
+  const bool is_one = count == 1;
+  return Counted(count, "image") + (is_one ? " keeps" : " keep") + " few of " +
+         (is_one ? "its" : "their") + " observations (" + names +
+         "): look at " + (is_one ? "its" : "their") +
+         " rotations and matches, or leave " + (is_one ? "it" : "them") +
+         " out";
+}
+
 }  // namespace
 
 std::string UnreliableSentence(const OutlierFilterSummary& summary) {
@@ -49,13 +72,15 @@ std::string UnreliableSentence(const OutlierFilterSummary& summary) {
     words += (words.empty() ? "" : "; ") + reason;
   };
   for (const WeakPart& part : summary.weak_parts) {
-    if (!part.is_held) add(WeakPartWords(part));
+    if (!part.is_held && !part.is_frame) add(WeakPartWords(part));
   }
   if (!words.empty()) {
     words +=
         "; match more pairs of images across, or take the parts as models of "
         "their own";
   }
+  const std::string loose = LooseFrameWords(summary.weak_parts);
+  if (!loose.empty()) add(loose);
   const auto num_removed = static_cast<int64_t>(summary.removed.size());
   if (summary.is_bound_beyond_reason) {
     add("hardly anything fits: half of all errors are so large that noise "
