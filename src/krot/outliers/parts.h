@@ -147,9 +147,9 @@ class PlaceSearch {
         variance_(sigma * sigma),
         tracks_(std::move(tracks)) {}
 
-  // The best of the places that pairs of tracks propose, for a scale of about
-  // `scale`; none if there are too few tracks.
-  std::optional<Place> Propose(double scale) const;
+  // The best of the places that pairs of tracks propose; none if there are too
+  // few tracks.
+  std::optional<Place> Propose() const;
   // The same with a rotation, which three tracks propose; for few tracks, too.
   std::optional<Place> ProposeTurned() const;
   // Infinite if it is `limit` or more.

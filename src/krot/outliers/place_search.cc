@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/outliers/parts.h"
 
@@ -28,6 +29,56 @@ Eigen::Matrix<double, kSize, kSize> InverseOf(
     const Eigen::Matrix<double, kSize, kSize>& M) {
   return (M + 1e-9 * M.trace() * M.Identity()).inverse();
 }
+
+Vector3d MedianPoint(const std::vector<Vector3d>& points) {
+  Vector3d median;
+  for (int d = 0; d < 3; ++d) {
+    std::vector<double> values;
+    for (const Vector3d& x : points) values.push_back(x(d));
+    median(d) = Median(std::move(values));
+  }
+  return median;
+}
+
+double MedianDistance(const std::vector<Vector3d>& points,
+                      const Vector3d& centre) {
+  std::vector<double> distances;
+  for (const Vector3d& x : points) distances.push_back((x - centre).norm());
+  return Median(std::move(distances));
+}
+
+// Coordinates in which the b sides of tracks, which may be small and far away,
+// are near 1, so that their shift and their scale can be told apart.
+class Unit {
+ public:
+  explicit Unit(const std::vector<SharedTrack>& tracks) {
+    if (tracks.empty()) return;
+    std::vector<Vector3d> a, b;
+    for (const SharedTrack& track : tracks) {
+      a.push_back(track.a.x);
+      b.push_back(track.b.x);
+    }
+    centre_ = MedianPoint(b);
+    length_ = MedianDistance(b, centre_);
+    scale_ = MedianDistance(a, MedianPoint(a)) / length_;
+  }
+
+  Vector3d In(const Vector3d& x_b) const { return (x_b - centre_) / length_; }
+  // About that of the a sides by that of the b sides.
+  double scale() const { return scale_; }
+  // Of a shift and a scale in these coordinates.
+  Place PlaceOf(const Vector4d& shift_and_scale) const {
+    Place place;
+    place.scale = shift_and_scale(3) / length_;
+    place.shift = shift_and_scale.head<3>() - place.scale * centre_;
+    return place;
+  }
+
+ private:
+  Vector3d centre_ = Vector3d::Zero();
+  double length_ = 1;
+  double scale_ = 1;
+};
 
 }  // namespace
 
@@ -70,7 +121,8 @@ std::pair<Vector3d, double> PlaceSearch::BestPoint(const SharedTrack& track,
 // A step of Gauss-Newton in the shift, the points of the tracks that agree and,
 // if it is free, the scale.
 Place PlaceSearch::Improve(const Place& place, bool is_scale_free) const {
-  Matrix4d S = Matrix4d::Zero();  // shift, scale
+  const Unit unit(tracks_);
+  Matrix4d S = Matrix4d::Zero();
   Vector4d rhs = Vector4d::Zero();
   for (const SharedTrack& track : tracks_) {
     const auto [x, cost] = BestPoint(track, place);
@@ -82,15 +134,15 @@ Place PlaceSearch::Improve(const Place& place, bool is_scale_free) const {
     b.g /= place.scale;
     const Matrix3d H_b_M = b.H * InverseOf<3>(a.H + b.H);
     Matrix34d moves = Matrix34d::Identity();
-    moves.col(3) = (x - place.shift) / place.scale;
+    moves.col(3) = unit.In((x - place.shift) / place.scale);
     S += moves.transpose() * (b.H - H_b_M * b.H) * moves;
     rhs += moves.transpose() * (b.g - H_b_M * (a.g + b.g));
   }
   Place moved = place;
   if (is_scale_free) {
-    const Vector4d step = InverseOf(S) * rhs;
-    moved.shift += step.head<3>();
-    moved.scale += step(3);
+    const Place step = unit.PlaceOf(InverseOf<4>(S) * rhs);
+    moved.shift += step.shift;
+    moved.scale += step.scale;
     if (!(moved.scale > 0)) return place;
   } else {
     moved.shift += InverseOf<3>(S.topLeftCorner<3, 3>()) * rhs.head<3>();
@@ -182,25 +234,23 @@ std::optional<Place> PlaceSearch::ProposeTurned() const {
   return best;
 }
 
-std::optional<Place> PlaceSearch::Propose(double scale) const {
+std::optional<Place> PlaceSearch::Propose() const {
   const auto count = static_cast<int64_t>(tracks_.size());
   if (count < 2) return std::nullopt;
-  std::vector<Matrix4d> S(tracks_.size());  // shift, scale
+  const Unit unit(tracks_);
+  std::vector<Matrix4d> S(tracks_.size());
   std::vector<Vector4d> rhs(tracks_.size());
   for (size_t j = 0; j < tracks_.size(); ++j) {
     Matrix34d moves = Matrix34d::Identity();
-    moves.col(3) = tracks_[j].b.x;
+    moves.col(3) = unit.In(tracks_[j].b.x);
     const Eigen::Matrix<double, 4, 3> weighed =
-        moves.transpose() * WeightOf(tracks_[j], scale);
+        moves.transpose() * WeightOf(tracks_[j], unit.scale());
     S[j] = weighed * moves;
     rhs[j] = weighed * tracks_[j].a.x;
   }
   Place best;
   ForSomePairs(count, kProposals, [&](int64_t i, int64_t j) {
-    const Vector4d fit = InverseOf<4>(S[i] + S[j]) * (rhs[i] + rhs[j]);
-    Place place;
-    place.scale = fit(3);
-    place.shift = fit.head<3>();
+    Place place = unit.PlaceOf(InverseOf<4>(S[i] + S[j]) * (rhs[i] + rhs[j]));
     if (!(place.scale > 0) || !std::isfinite(place.scale)) return;
     place.cost = Cost(place, best.cost);
     if (place.cost < best.cost) best = place;

@@ -132,8 +132,9 @@ int64_t NumAgreeing(const KnownRotationProblem& problem,
   return Agreement(problem, estimate, norm, cap).num_agreeing;
 }
 
-bool MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
-                     double level, const Context& context, Estimate* estimate) {
+int32_t MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
+                        double level, const Context& context,
+                        Estimate* estimate) {
   MinimizeRobustly(problem, context, estimate);
   for (int n = 0;; ++n) {
     const double cap =
@@ -150,11 +151,10 @@ bool MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
       return 1000 * gain > now.num_agreeing;
     };
     const std::vector<int32_t> part_of = FindParts(problem, now.agrees, {});
-    const bool is_whole =
-        *std::max_element(part_of.begin(), part_of.end()) == 0;
-    const bool is_tied = is_whole && now.loose_frames.empty();
-    if (is_tied || n == 8 || context.IsCancelled()) return is_tied;
-    if (!is_whole && helps([&](Estimate* moved) {
+    const int32_t num_parts =
+        1 + *std::max_element(part_of.begin(), part_of.end());
+    if (n == 8 || context.IsCancelled()) return num_parts;
+    if (num_parts > 1 && helps([&](Estimate* moved) {
           PlaceParts(problem, part_of, norm, level, context, {}, moved);
         })) {
       continue;
@@ -163,7 +163,7 @@ bool MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
           PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
                               kCapOfPoints * level, context, moved);
         })) {
-      return false;
+      return num_parts;
     }
   }
 }

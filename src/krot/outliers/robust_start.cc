@@ -275,17 +275,23 @@ std::optional<Estimate> StartOfParts(const KnownRotationProblem& problem,
 
 Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
                           double level, const Context& context) {
-  Estimate whole = StartOfPart(problem, norm, level, context);
-  if (MinimizeAndJoin(problem, norm, level, context, &whole)) return whole;
   std::optional<Estimate> of_parts =
       StartOfParts(problem, norm, level, context);
+  const int32_t num_untied =
+      of_parts ? MinimizeAndJoin(problem, norm, level, context, &*of_parts) : 0;
+  if (num_untied == 1) return std::move(*of_parts);
+  Estimate whole = StartOfPart(problem, norm, level, context);
+  const int32_t num_untied_of_whole =
+      MinimizeAndJoin(problem, norm, level, context, &whole);
   if (!of_parts) return whole;
-  MinimizeAndJoin(problem, norm, level, context, &*of_parts);
-  const auto num_agreeing = [&](const Estimate& estimate) {
-    return NumAgreeing(problem, estimate, norm, kCapOfPoints * level);
+  const auto rank = [&](const Estimate& estimate, int32_t num_parts) {
+    return std::make_pair(
+        num_parts, -NumAgreeing(problem, estimate, norm, kCapOfPoints * level));
   };
-  const bool is_better = num_agreeing(*of_parts) > num_agreeing(whole);
-  return std::move(is_better ? *of_parts : whole);
+  return std::move(rank(whole, num_untied_of_whole) <
+                           rank(*of_parts, num_untied)
+                       ? whole
+                       : *of_parts);
 }
 
 }  // namespace

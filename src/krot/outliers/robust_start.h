@@ -77,7 +77,8 @@ Eigen::Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i);
 //      what the others do not tie is joined anew, and frames that hardly agree
 //      are placed anew, while that makes more observations agree;
 //   7. if parts are left that nothing ties, all is placed as one part, too, and
-//      the start with which more observations agree is taken.
+//      the start is taken with fewer such parts or, if there are as many, with
+//      which more observations agree.
 //
 // Errors above `level`, pixels, count as wrong there. Depths are positive but
 // for those of outliers.
@@ -100,9 +101,10 @@ void PlaceParts(const KnownRotationProblem& problem,
 // MinimizeRobustly for a connected problem. As tracks that cost more than a
 // bound hold nothing, frames may have run away from the others there, alone or
 // in parts: they are placed anew, as long as more observations agree then.
-// Returns whether what agrees ties all frames in the end.
-bool MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
-                     double level, const Context& context, Estimate* estimate);
+// Returns into how many parts the frames fall that what agrees ties; > 0.
+int32_t MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
+                        double level, const Context& context,
+                        Estimate* estimate);
 
 // How many observations agree with another one of their tracks: their errors
 // are at most `cap`, pixels. O(observations).

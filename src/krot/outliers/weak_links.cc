@@ -204,7 +204,7 @@ class Joiner {
     for (size_t n = 0; n < all.size(); n += stride) some.push_back(all[n]);
     const PlaceSearch tracks(problem_, estimate_, sigma_, std::move(some));
     if (may_move_ && is_scale_free) {
-      if (const std::optional<Place> place = tracks.Propose(/*scale=*/1)) {
+      if (const std::optional<Place> place = tracks.Propose()) {
         Unite(pair, *place);
         return link;
       }
