@@ -135,8 +135,10 @@ struct BundleAdjustmentSummary {
   std::string linear_solver;                          // "dense_schur", ...
 
   std::optional<double> max_error;  // the cap at the end, pixels
-  // With lower_max_error: nearly the local minimum of the largest error.
+  // With lower_max_error: the lowest largest error that was reached. It is
+  // nearly a local minimum if the search for it converged.
   std::optional<double> lowest_max_error;  // pixels
+  bool is_lowest_max_error_converged = false;
 
   // Distance from a stationary point (0 there) at the end: g'D^-1 g / (2 cost),
   // with g the gradient and D the diagonal of J'J. To first order this is the

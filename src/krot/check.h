@@ -66,7 +66,8 @@ struct ObservationNoise {
   // The standardised error, over the controlled directions. If only one is
   // controlled, it is converted to the w of two directions that has the same
   // probability of being exceeded. Infinite if the point is not in front of the
-  // camera, NaN if no direction is controlled.
+  // camera or is in it, nearer than a billionth of the median camera's
+  // distance from the middle of the cameras; NaN if no direction is controlled.
   double w = 0;
 };
 
@@ -159,7 +160,7 @@ struct WrongObservation {
   std::string image_name;
   uint32_t point2D_idx = 0;
   Point3DId point3D_id = 0;
-  double w = 0;  // infinite: the point is not in front of the camera
+  double w = 0;  // infinite: the point is in the camera, or not before it
   // Distance from where the rest of its track puts the point; or NaN.
   double error_px = 0;
   // Both observations of a track of two are listed: nothing tells which is

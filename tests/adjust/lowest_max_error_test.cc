@@ -61,6 +61,7 @@ TEST(LowestMaxError, IsBelowWhatFixedRotationsAndWhatACapAllow) {
     EXPECT_LE(*summary.max_error,
               1.0005 * *summary.adjustment.lowest_max_error * (1 + 1e-12));
     EXPECT_LE(max, summary.start->LowestCost());
+    EXPECT_TRUE(summary.adjustment.is_lowest_max_error_converged);
     // Rotations and intrinsics gain something.
     EXPECT_LT(max, 0.99 * *summary.start->lower_bound);
 
@@ -103,6 +104,15 @@ TEST(LowestMaxError, LeavesLeastSquaresWhereNothingIsGained) {
   EXPECT_LE(MaxError(result.model), 1.0005 * lowest);
   EXPECT_LT(result.summary.pixel_error_after.rms,
             result.summary.pixel_error_start.rms);
+}
+
+TEST(LowestMaxError, IsNotConvergedWhereTheIterationsWereTooFew) {
+  const Model model = SynthesizeScene(NoisyOptions()).model;
+  AdjustModelOptions options = Lowered();
+  options.adjustment.max_num_iterations = 5;
+  const AdjustModelResult result = AdjustModel(model, options, kLowerAlone);
+  EXPECT_TRUE(result.summary.adjustment.lowest_max_error);
+  EXPECT_FALSE(result.summary.adjustment.is_lowest_max_error_converged);
 }
 
 TEST(LowestMaxError, IsThatOfTheBestIterateWhenCancelled) {

@@ -452,6 +452,37 @@ TEST(SnoopNoise, RemovesWhatDoesNotSeeItsPoint) {
   }
 }
 
+TEST(SnoopNoise, RemovesWhatHasItsPointInTheCamera) {
+  Model model = TwoCameras(4);
+  // COLMAP leaves such models: two cameras in one place, held together by a
+  // point that lies in both, and fits them exactly.
+  constexpr double kApart = 1e-11;
+  model.images[3].cam_from_world.translation.x() =
+      model.images[2].cam_from_world.translation.x() - kApart;
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    model.images[3].points2D[k].x = model.images[2].points2D[k].x;
+  }
+  Point3D point;
+  point.id = 51;
+  point.xyz = {2, 0, 4 * kApart};
+  point.track_begin = model.track_elements.size();
+  model.track_elements.push_back({3, 50});
+  model.track_elements.push_back({4, 50});
+  point.track_end = model.track_elements.size();
+  model.points3D.push_back(point);
+  model.images[2].points2D.push_back({500, 500, 51});
+  model.images[3].points2D.push_back({250, 500, 51});
+  model.frames.clear();
+  model.rigs.clear();
+  UseTrivialRigs(&model);
+  const NoiseSnooping snooping = SnoopNoise(model, {}, {});
+  EXPECT_EQ(Removed(snooping),
+            (std::set<uint64_t>{point.track_begin, point.track_begin + 1}));
+  for (const SnoopedObservation& one : snooping.removed) {
+    EXPECT_TRUE(std::isinf(one.w));
+  }
+}
+
 TEST(SnoopNoise, KeepsMostWhereTheNoiseHasNoSigma) {
   SceneOptions options = SmallScene(30);
   options.pixel_noise = 0;

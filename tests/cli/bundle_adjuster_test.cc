@@ -353,6 +353,17 @@ TEST_F(BundleAdjuster, StaysBelowACapThatIsAFactor) {
   EXPECT_LT(errors.max, report["max_error"]);
 }
 
+TEST_F(BundleAdjuster, CallsNothingALocalMinimumWhereTheSearchEndedEarly) {
+  const KrotResult result =
+      Adjust({"--BundleAdjustment.max_error", "minimum",
+              "--BundleAdjustmentCeres.max_num_iterations", "5"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::HasSubstr("a lower one may well exist"));
+  EXPECT_THAT(result.out, ::testing::Not(::testing::HasSubstr("minimum")));
+  EXPECT_THAT(result.out, ::testing::Not(::testing::HasSubstr("which holds")));
+  EXPECT_EQ(Report()["is_lowest_max_error_converged"], false);
+}
+
 TEST_F(BundleAdjuster, LowersTheLargestErrorWithAllThatMoves) {
   const KrotResult result = Adjust({"--BundleAdjustment.max_error", "minimum"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -360,6 +371,7 @@ TEST_F(BundleAdjuster, LowersTheLargestErrorWithAllThatMoves) {
   EXPECT_THAT(result.err, ::testing::HasSubstr(" px, barrier "));
   const Json report = Report();
   EXPECT_EQ(report["termination"], "cap_converged");
+  EXPECT_EQ(report["is_lowest_max_error_converged"], true);
   const double max = Summarize(PixelErrors(Load(folder_ / "output"))).max;
   EXPECT_GE(report["max_error"], report["lowest_max_error"]);
   EXPECT_LE(report["max_error"],

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/model.h"
+#include "krot/model/derived_models.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/lp_oracle.h"
@@ -292,6 +293,37 @@ TEST(AnalyzeTolerances, HasNoEndBehindAPointThatMayBeInfinitelyFarAway) {
     num_ends += box.high[axis].proved.has_value();
   }
   EXPECT_LT(num_ends, 6);
+}
+
+// A copy in which an image has one observation only.
+Model WithOneObservation(const Model& model, size_t image) {
+  std::vector<char> is_removed(model.track_elements.size(), 0);
+  int64_t num_seen = 0;
+  for (size_t e = 0; e < model.track_elements.size(); ++e) {
+    if (model.track_elements[e].image_id != model.images[image].id) continue;
+    is_removed[e] = ++num_seen > 1;
+  }
+  return RemoveObservations(model, is_removed).model;
+}
+
+TEST(AnalyzeTolerances, IsOpenOnlyForAFrameThatMayBeInfinitelyFarAway) {
+  for (const size_t image : {0, 3}) {
+    const Model model =
+        WithOneObservation(SynthesizeScene(SmallNoisyScene(3, 1)).model, image);
+    const ToleranceResult result =
+        AnalyzeTolerances(model, AskFor(model, 3, 0));
+    ASSERT_EQ(result.summary.termination, ToleranceTermination::kDone);
+    for (size_t i = 0; i < model.images.size(); ++i) {
+      EXPECT_NE(result.summary.gauge_images.back(), model.images[image].name);
+      const PositionBox& box = result.summary.boxes[i].box;
+      bool is_closed = true;
+      for (int axis = 0; axis < 3; ++axis) {
+        is_closed = is_closed && box.low[axis].proved && box.high[axis].proved;
+      }
+      EXPECT_EQ(is_closed, i != image) << i << " without " << image;
+    }
+    EXPECT_LT(result.summary.agreement.worst, 0.011);
+  }
 }
 
 TEST(AnalyzeTolerances, RefusesWhatHoldsNothingTogether) {

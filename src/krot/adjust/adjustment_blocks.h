@@ -321,8 +321,9 @@ void AdjustBelowCap(const BundleAdjustmentOptions& options,
 // Moves nearly to a local minimum of the largest error: the cap becomes an
 // unknown, with a weight beside which the squared errors hardly count. Counts
 // iterations in the summary and sets its lowest_max_error, which is that of the
-// start if it cannot be lowered, and blocks->cap2, for a cap 5e-4 above that.
-// In the end all errors are below this cap.
+// start if it cannot be lowered, is_lowest_max_error_converged, and
+// blocks->cap2, for a cap 5e-4 above that. In the end all errors are below this
+// cap.
 void LowerMaxError(const BundleAdjustmentOptions& options,
                    const Context& context, const AdjustmentColumns& columns,
                    AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary);

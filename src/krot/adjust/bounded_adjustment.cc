@@ -337,6 +337,7 @@ void LowerMaxError(const BundleAdjustmentOptions& options,
   BarrierPath path(options, context, with_cap, *blocks, summary);
   path.BeginAtCap();
   path.Follow();
+  summary->is_lowest_max_error_converged = path.IsConverged();
   summary->lowest_max_error = std::min(path.LargestError(), start_error);
   const double cap = (1 + 5e-4) * *summary->lowest_max_error;
   // The least squares below this cap need some room at their start.

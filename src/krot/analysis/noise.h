@@ -19,7 +19,7 @@ inline constexpr double kLeastNoisePx = 1e-3;
 struct SnoopedObservation {
   uint64_t element = 0;  // in Model::track_elements
   // When it was removed; of a track of two the larger one. Infinite: the point
-  // is not in front of the camera.
+  // is in the camera, or not in front of it.
   double w = 0;
   // Its error where the rest of its track places the point, pixels; if nothing
   // is left, where the last two did. NaN if that is not in front of its camera.
@@ -112,7 +112,8 @@ class TrackNoise {
 
   const Model& model_;
   const std::vector<double>& relative_sigmas_;
-  std::vector<View> views_;              // as Model::images
+  std::vector<View> views_;    // as Model::images
+  double least_distance_ = 0;  // a nearer point is in the camera; scene units
   const std::vector<int32_t> image_of_;  // by track element
   std::vector<int32_t> point_of_;
   std::vector<char> takes_part_;

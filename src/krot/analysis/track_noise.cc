@@ -1,6 +1,7 @@
 #include "krot/analysis/noise.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 
 #include <Eigen/Eigenvalues>
@@ -34,6 +35,28 @@ Eigen::Matrix<double, 4, 3> TangentBasis(const Vector4d& X) {
   return reflection.leftCols<3>();
 }
 
+// The median distance of the cameras from the median of their centres; 0
+// without cameras.
+double RadiusOfCentres(const std::vector<ImageGeometry>& geometries) {
+  std::array<std::vector<double>, 3> coordinates;
+  for (const ImageGeometry& geometry : geometries) {
+    if (!geometry.has_pose) continue;
+    const Vector3d center = Center(geometry.cam_from_world);
+    for (int i = 0; i < 3; ++i) coordinates[i].push_back(center[i]);
+  }
+  const size_t num = coordinates[0].size();
+  if (num == 0) return 0;
+  Vector3d middle;
+  for (int i = 0; i < 3; ++i) middle[i] = LowerMedian(coordinates[i]);
+  std::vector<double> distances(num);
+  for (size_t n = 0; n < num; ++n) {
+    const Vector3d center(coordinates[0][n], coordinates[1][n],
+                          coordinates[2][n]);
+    distances[n] = (center - middle).norm();
+  }
+  return LowerMedian(std::move(distances));
+}
+
 }  // namespace
 
 // Fits a point in homogeneous coordinates, so that one at infinity, or beyond
@@ -56,6 +79,7 @@ class TrackNoise::Track {
     }
     Begin();
     Minimize();
+    DropInCamera();
     Describe();
   }
 
@@ -161,6 +185,28 @@ class TrackNoise::Track {
     }
   }
 
+  // Any observation fits a point in its camera, so it says nothing. Two cameras
+  // that hold the same point can hardly move apart. Other points of such two
+  // are not in the camera, though their fit may be.
+  void DropInCamera() {
+    const Vector3d& in_model = all_.model_.points3D[k_].xyz;
+    size_t num = 0;
+    for (size_t n = 0; n < rows_.size(); ++n) {
+      const uint64_t e = elements_[n];
+      const Vector3d away =
+          X_.head<3>() * unit_ + X_[3] * (origin_ - ViewOf(e).center);
+      if (away.norm() < X_[3] * all_.least_distance_ &&
+          (in_model - ViewOf(e).center).norm() < all_.least_distance_) {
+        all_.observations_[e] = NotTested(kInfinity);
+      } else {
+        elements_[num] = e;
+        rows_[num++] = rows_[n];
+      }
+    }
+    elements_.resize(num);
+    rows_.resize(num);
+  }
+
   // R_ii, and the standardised errors that it gives.
   void Describe() {
     Matrix3d H = Matrix3d::Zero();
@@ -222,6 +268,9 @@ TrackNoise::TrackNoise(const Model& model,
     }
     views_.push_back(view);
   }
+  // Points that hold cameras together are as near as rounding allows, 1e-11
+  // and less; a part of a real model may be as small as 1e-7 of it.
+  least_distance_ = 1e-9 * RadiusOfCentres(geometries);
   for (size_t e = 0; e < model.track_elements.size(); ++e) {
     takes_part_[e] = views_[image_of_[e]].camera != nullptr;
     observations_[e] = NotTested(kNaN);

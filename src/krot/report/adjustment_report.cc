@@ -86,11 +86,18 @@ std::string CapSentence(const AdjustModelSummary& summary) {
   if (adjustment.lowest_max_error) {
     text << "The lowest maximum found with all that moves is "
          << FormatNumber(*adjustment.lowest_max_error, 4)
-         << " px: a local minimum, nearly, of which no bound is proved. ";
+         << (adjustment.is_lowest_max_error_converged
+                 ? " px: a local minimum, nearly, of which no bound is proved. "
+                 : " px, but the search for it ended early, so a lower one may "
+                   "well exist. ");
   }
   text << "Every error of the adjustment is below the cap of "
-       << FormatNumber(*summary.max_error, 4) << " px, which holds "
-       << Counted(adjustment.num_active, "observation") << ".";
+       << FormatNumber(*summary.max_error, 4) << " px";
+  // Before the end of the path every observation has a multiplier.
+  if (adjustment.termination == BundleAdjustmentTermination::kCapConverged) {
+    text << ", which holds " << Counted(adjustment.num_active, "observation");
+  }
+  text << ".";
   if (adjustment.duality_gap) {
     text << " Duality gap " << Scientific(*adjustment.duality_gap)
          << " of the cost.";
@@ -203,6 +210,10 @@ std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
   const BundleAdjustmentSummary& adjustment = summary.adjustment;
   // Null unless there was a solve below the cap.
   Json start_bound, start_seconds;
+  Json is_lowest;  // null unless a lowest maximum was asked for
+  if (adjustment.lowest_max_error) {
+    is_lowest = adjustment.is_lowest_max_error_converged;
+  }
   Json precision;  // null unless it was asked for
   if (summary.precision) precision = PrecisionJson(*summary.precision, model);
   if (summary.start) {
@@ -227,6 +238,7 @@ std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
       {"stationarity", NumberOrNull(adjustment.stationarity)},
       {"max_error", NumberOrNull(summary.max_error)},
       {"lowest_max_error", NumberOrNull(adjustment.lowest_max_error)},
+      {"is_lowest_max_error_converged", is_lowest},
       {"duality_gap", NumberOrNull(adjustment.duality_gap)},
       {"num_active", adjustment.num_active},
       {"start_lower_bound", start_bound},

@@ -92,7 +92,7 @@ std::string ObservationTable(const ModelCheck& check, size_t max_rows) {
     const WrongObservation& one = check.observations[n];
     table.AddRow({one.image_name, std::to_string(one.point2D_idx),
                   std::to_string(one.point3D_id),
-                  std::isfinite(one.w) ? FormatNumber(one.w, 1) : "not seen",
+                  std::isfinite(one.w) ? FormatNumber(one.w, 1) : "not in front",
                   FormatNumber(one.error_px, 2),
                   one.is_of_two ? "this or the other one" : ""});
   }

@@ -5,6 +5,7 @@
 
 #include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"
+#include "krot/sweeps/res_int.h"
 
 namespace krot::internal {
 namespace {
@@ -138,6 +139,23 @@ class EndSearch {
     }
   }
 
+  // Moves the frames outside of the usable part to where they fit in best.
+  void PlaceOtherFrames(Estimate* estimate) const {
+    const KnownRotationProblem& whole = shared_.problem();
+    std::vector<int64_t> theirs;
+    for (size_t n = 0; n < whole.observations.size(); ++n) {
+      const Observation& o = whole.observations[n];
+      if (usable_.FindPoint(o.point) && !usable_.FindView(o.view)) {
+        theirs.push_back(static_cast<int64_t>(n));
+      }
+    }
+    const ProblemSubset part(whole, std::move(theirs));
+    Estimate placed = part.Restrict(*estimate);
+    BlockSweep(part.problem(), FastDescentOptions(), shared_.norm(), context_)
+        .ResectFrames(&placed);
+    part.Replace(placed, estimate);
+  }
+
   // Moves the points outside of the set to where they fit in best. Those of the
   // set stay, even if they are above the bound by a rounding error.
   void PlaceOthers(const KnownRotationProblem& whole, const WorkingSet& set,
@@ -158,6 +176,7 @@ class EndSearch {
     part.Replace(estimate, of_usable);
     PlaceOthers(problem(), set_, of_usable);
     usable_.Replace(*of_usable, &whole);
+    PlaceOtherFrames(&whole);
     PlaceOthers(shared_.problem(), usables_, &whole);
     return whole;
   }

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "krot/base/check.h"
@@ -60,10 +61,17 @@ bool FindModel(const ToleranceOptions& options, const Context& context,
 
 ToleranceGauge GaugeFor(const ToleranceOptions& options,
                         const BuiltProblem& built,
-                        const std::vector<int32_t>& view_of) {
+                        const std::vector<int32_t>& view_of,
+                        const Context& context) {
   if (HasFixed(built.problem)) return {};
   if (options.gauge_images.empty()) {
-    return ChooseGauge(built.problem, built.start);
+    std::vector<int64_t> all(built.problem.observations.size());
+    std::iota(all.begin(), all.end(), 0);
+    return ChooseGauge(
+        built.problem, built.start,
+        FindFarParts(built.problem, std::move(all), options.solve.norm,
+                     options.max_error, context)
+            .frames);
   }
   ToleranceGauge gauge;
   const Components components = FindComponents(built.problem);
@@ -310,7 +318,7 @@ ToleranceResult AnalyzeInFrame(const Model& model,
   }
   const std::vector<int32_t> view_of =
       InverseOf(built.image_of, result.model.images.size());
-  const ToleranceGauge gauge = GaugeFor(options, built, view_of);
+  const ToleranceGauge gauge = GaugeFor(options, built, view_of, context);
   for (const std::optional<Pull>& view : {gauge.first, gauge.second}) {
     if (!view) continue;
     summary.gauge_images.push_back(

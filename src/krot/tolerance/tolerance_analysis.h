@@ -67,12 +67,21 @@ Extent FindExtent(const KnownRotationProblem& problem, const Pulls& pulls,
 BlockVector CoefficientsOf(const KnownRotationProblem& problem,
                            const Pulls& pulls);
 
-// Marks the points whose residuals are all below `bound`, pixels, when the
-// point is infinitely far away in some direction. Such a point fits in wherever
-// the frames are, if it is far enough away, and so it says nothing about them.
-// O(observations).
-std::vector<char> FindFarPoints(const KnownRotationProblem& problem, Norm norm,
-                                double bound, const Context& context);
+// What may be infinitely far away, and so says nothing about all else.
+struct FarParts {
+  std::vector<char> points;
+  std::vector<char> frames;
+};
+
+// Marks the points and frames of the given observations (ascending) whose
+// residuals are all below `bound`, pixels, when the point, or the frame, is
+// infinitely far away in some direction. Such a point fits in wherever the
+// frames are, if it is far enough away, and such a frame wherever the points
+// are. So they are left out, and the rest is looked at anew. What is fixed is
+// not marked. O(observations) for each time.
+FarParts FindFarParts(const KnownRotationProblem& problem,
+                      std::vector<int64_t> observations, Norm norm,
+                      double bound, const Context& context);
 
 // What holds place and scale of the estimates.
 struct ToleranceGauge {
@@ -86,9 +95,11 @@ struct ToleranceGauge {
 
 // A gauge for a problem that fixes nothing: the view with the most observations
 // and, of the views connected to it, the one that is farthest away in the
-// estimate. No second if a baseline sets the scale.
+// estimate, but for frames marked as far where there are others. No second if a
+// baseline sets the scale.
 ToleranceGauge ChooseGauge(const KnownRotationProblem& problem,
-                           const Estimate& estimate);
+                           const Estimate& estimate,
+                           const std::vector<char>& is_far_frame);
 
 // The estimates whose true errors are all at most `bound`, in a gauge: the
 // problem that all boxes are about.
@@ -112,7 +123,8 @@ class ToleranceProblem {
 
   // The part of the problem that bounds anything and is connected to something
   // fixed: without observations that have no outer row, and without far points
-  // other than targets. None if it does not contain all targets that may move.
+  // and frames other than targets. None if it does not contain all targets that
+  // may move.
   std::optional<ProblemSubset> UsablePart(const Pulls& targets) const;
 
   int64_t num_rowless() const { return num_rowless_; }
@@ -127,7 +139,7 @@ class ToleranceProblem {
   const double bound_;
   std::optional<ScaleRow> scale_;
   std::vector<char> has_row_;  // per observation
-  std::vector<char> is_far_;   // per point
+  FarParts far_;
   int64_t num_rowless_ = 0;
   int64_t num_far_points_ = 0;
 };
@@ -235,7 +247,7 @@ struct ToleranceSummary {
   int64_t num_points = 0;
   int64_t num_observations = 0;
   int64_t num_rowless = 0;     // observations without an outer row
-  int64_t num_far_points = 0;  // which bound no camera: see FindFarPoints
+  int64_t num_far_points = 0;  // which bound no camera: see FindFarParts
   int64_t num_programmes = 0;
   int64_t num_fixed_frames = 0;  // by options, not by the gauge
   int64_t num_fixed_points = 0;

@@ -120,7 +120,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Moves all cameras to one place, so that a point matters as a direction only.
+// Moves all cameras of a frame to one place, and frees what is fixed, so that a
+// point or a frame matters as a direction only.
 KnownRotationProblem WithoutPositions(KnownRotationProblem problem) {
   for (View& view : problem.views) view.cam_from_rig_translation.setZero();
   problem.fixed_translations.clear();
@@ -128,16 +129,24 @@ KnownRotationProblem WithoutPositions(KnownRotationProblem problem) {
   return problem;
 }
 
-// For each point the sum of its unit rays.
-Estimate MeanDirections(const KnownRotationProblem& problem) {
+enum class Kind { kPoints, kFrames };
+
+// All in one place but the points, or the frames: these are where the sum of
+// their unit rays leads.
+Estimate MeanDirections(const KnownRotationProblem& problem, Kind kind) {
   Estimate estimate;
   estimate.translations.assign(problem.num_frames, Vector3d::Zero());
   estimate.points.assign(problem.num_points, Vector3d::Zero());
   for (const Observation& o : problem.observations) {
-    const Vector3d ray = o.E.inverse().col(0);
-    estimate.points[o.point] +=
-        problem.views[o.view].cam_from_world_rotation.transpose() *
-        ray.normalized();
+    const View& view = problem.views[o.view];
+    const Vector3d ray = o.E.inverse().col(0).normalized();
+    if (kind == Kind::kPoints) {
+      estimate.points[o.point] +=
+          view.cam_from_world_rotation.transpose() * ray;
+    } else {
+      estimate.translations[view.frame] +=
+          view.cam_from_rig_rotation.transpose() * ray;
+    }
   }
   return estimate;
 }
@@ -159,37 +168,80 @@ void Fix(const Pull& what, const Estimate& at, KnownRotationProblem* problem) {
   problem->fixed_translations[frame] = at.translations[frame];
 }
 
-}  // namespace
-
-std::vector<char> FindFarPoints(const KnownRotationProblem& problem, Norm norm,
-                                double bound, const Context& context) {
+// Marks the points, or the frames, whose residuals are all below the bound
+// where they are infinitely far away in some direction.
+std::vector<char> FindFar(const KnownRotationProblem& problem, Kind kind,
+                          Norm norm, double bound, const Context& context) {
+  const bool is_of_points = kind == Kind::kPoints;
   const KnownRotationProblem directions = WithoutPositions(problem);
-  Estimate estimate = MeanDirections(directions);
-  const auto cost = [&](int32_t k) {
-    return PointCost(directions, estimate, norm, k);
-  };
-  std::vector<int64_t> undecided;
-  for (int32_t k = 0; k < problem.num_points; ++k) {
-    if (cost(k) < bound || !std::isfinite(cost(k))) continue;
-    for (const int64_t i : problem.OfPoint(k)) {
-      undecided.push_back(i);
+  Estimate estimate = MeanDirections(directions, kind);
+  const int32_t count = is_of_points ? problem.num_points : problem.num_frames;
+  std::vector<double> costs(count);
+  const auto measure = [&] {
+    for (int32_t n = 0; n < count; ++n) {
+      costs[n] = is_of_points ? PointCost(directions, estimate, norm, n)
+                              : FrameCost(directions, estimate, norm, n);
     }
+  };
+  measure();
+  std::vector<int64_t> undecided;
+  for (size_t n = 0; n < directions.observations.size(); ++n) {
+    const auto i = static_cast<int64_t>(n);
+    const double cost = costs[is_of_points ? directions.observations[n].point
+                                           : directions.FrameOf(i)];
+    if (cost >= bound && std::isfinite(cost)) undecided.push_back(i);
   }
   const ProblemSubset part(directions, std::move(undecided));
   Estimate lowered = part.Restrict(estimate);
-  BlockSweep(part.problem(), FastDescentOptions(), norm, context)
-      .IntersectPoints(&lowered);
+  BlockSweep sweep(part.problem(), FastDescentOptions(), norm, context);
+  if (is_of_points) {
+    sweep.IntersectPoints(&lowered);
+  } else {
+    sweep.ResectFrames(&lowered);
+  }
   part.Replace(lowered, &estimate);
-  std::vector<char> is_far(problem.num_points, 0);
-  for (int32_t k = 0; k < problem.num_points; ++k) {
-    const bool is_seen = problem.point_begin[k] < problem.point_begin[k + 1];
-    is_far[k] = is_seen && !problem.IsFixedPoint(k) && cost(k) < bound;
+  measure();
+  std::vector<char> is_far(count, 0);
+  for (int32_t n = 0; n < count; ++n) {
+    const bool is_fixed =
+        is_of_points ? problem.IsFixedPoint(n) : problem.IsFixedFrame(n);
+    is_far[n] = !is_fixed && costs[n] < bound;
   }
   return is_far;
 }
 
+}  // namespace
+
+FarParts FindFarParts(const KnownRotationProblem& problem,
+                      std::vector<int64_t> observations, Norm norm,
+                      double bound, const Context& context) {
+  FarParts far;
+  far.points.assign(problem.num_points, 0);
+  far.frames.assign(problem.num_frames, 0);
+  for (;;) {
+    const ProblemSubset part(problem, observations);
+    const std::vector<char> points =
+        FindFar(part.problem(), Kind::kPoints, norm, bound, context);
+    const std::vector<char> frames =
+        FindFar(part.problem(), Kind::kFrames, norm, bound, context);
+    std::vector<int64_t> left;
+    for (size_t n = 0; n < observations.size(); ++n) {
+      const auto in_part = static_cast<int64_t>(n);
+      const int64_t i = observations[n];
+      const bool is_point_far = points[part.problem().observations[n].point];
+      const bool is_frame_far = frames[part.problem().FrameOf(in_part)];
+      if (is_point_far) far.points[problem.observations[i].point] = 1;
+      if (is_frame_far) far.frames[problem.FrameOf(i)] = 1;
+      if (!is_point_far && !is_frame_far) left.push_back(i);
+    }
+    if (left.size() == observations.size()) return far;
+    observations = std::move(left);
+  }
+}
+
 ToleranceGauge ChooseGauge(const KnownRotationProblem& problem,
-                           const Estimate& estimate) {
+                           const Estimate& estimate,
+                           const std::vector<char>& is_far_frame) {
   std::vector<int64_t> counts(problem.views.size(), 0);
   for (const Observation& o : problem.observations) ++counts[o.view];
   ToleranceGauge gauge;
@@ -202,12 +254,13 @@ ToleranceGauge ChooseGauge(const KnownRotationProblem& problem,
     return components.of_frame[problem.views[v].frame];
   };
   const Vector3d at_first = CentreAt(problem, estimate, first);
-  double farthest = 0;
+  std::pair<bool, double> best = {false, 0};
   for (int32_t v = 0; v < static_cast<int32_t>(counts.size()); ++v) {
     if (counts[v] == 0 || component(v) != component(first)) continue;
     const double distance = (CentreAt(problem, estimate, v) - at_first).norm();
-    if (distance <= farthest) continue;
-    farthest = distance;
+    const std::pair here = {!is_far_frame[problem.views[v].frame], distance};
+    if (distance == 0 || here <= best) continue;
+    best = here;
     gauge.second = {Pull::Kind::kView, v};
   }
   return gauge;
@@ -253,23 +306,35 @@ ToleranceProblem::ToleranceProblem(const Model& model, BuiltProblem* built,
     if (!(ResidualOf(viewed, norm) < bound)) has_row_[i] = 0;
   }
   num_rowless_ = std::count(has_row_.begin(), has_row_.end(), char{0});
-  is_far_ = FindFarPoints(problem, norm, bound, context);
-  num_far_points_ = std::count(is_far_.begin(), is_far_.end(), char{1});
+  std::vector<int64_t> with_row;
+  for (size_t i = 0; i < has_row_.size(); ++i) {
+    if (has_row_[i]) with_row.push_back(static_cast<int64_t>(i));
+  }
+  far_ = FindFarParts(problem, std::move(with_row), norm, bound, context);
+  num_far_points_ = std::count(far_.points.begin(), far_.points.end(), char{1});
 }
 
 std::optional<ProblemSubset> ToleranceProblem::UsablePart(
     const Pulls& targets) const {
   const KnownRotationProblem& whole = problem();
-  std::vector<char> is_far = is_far_;
+  FarParts far = far_;
   for (const Pulls& wanted : {targets, scale_ ? Pulls{*scale_} : Pulls{}}) {
     for (const Pull& pull : wanted) {
-      if (pull.kind == Pull::Kind::kPoint) is_far[pull.index] = 0;
+      if (pull.kind == Pull::Kind::kPoint) {
+        far.points[pull.index] = 0;
+      } else {
+        far.frames[whole.views[pull.index].frame] = 0;
+      }
     }
   }
   std::vector<int64_t> usable;
   for (size_t i = 0; i < whole.observations.size(); ++i) {
-    if (!has_row_[i] || is_far[whole.observations[i].point]) continue;
-    usable.push_back(static_cast<int64_t>(i));
+    const auto n = static_cast<int64_t>(i);
+    if (!has_row_[i] || far.points[whole.observations[i].point] ||
+        far.frames[whole.FrameOf(n)]) {
+      continue;
+    }
+    usable.push_back(n);
   }
   ProblemSubset part(whole, HeldObservations(whole, std::move(usable)));
   for (const Pull& target : targets) {
