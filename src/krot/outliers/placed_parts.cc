@@ -85,7 +85,8 @@ struct Agreement {
   int64_t num_agreeing = 0;
   // Frames that disagree with most of what they see of the others' points.
   std::vector<int32_t> loose_frames;
-  std::vector<char> is_placed;  // points that two other frames agree on
+  std::vector<int32_t> loose_points;  // no two observations agree; ascending
+  std::vector<char> is_placed;        // points that two other frames agree on
 };
 
 Agreement::Agreement(const KnownRotationProblem& problem,
@@ -101,7 +102,10 @@ Agreement::Agreement(const KnownRotationProblem& problem,
         own.push_back(i);
       }
     }
-    if (own.size() < 2) continue;
+    if (own.size() < 2) {
+      loose_points.push_back(k);
+      continue;
+    }
     num_agreeing += static_cast<int64_t>(own.size());
     for (const int64_t i : own) {
       agrees[i] = 1;
@@ -159,8 +163,14 @@ int32_t MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
         })) {
       continue;
     }
-    if (now.loose_frames.empty() || !helps([&](Estimate* moved) {
+    if (!now.loose_frames.empty() && helps([&](Estimate* moved) {
           PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
+                              kCapOfPoints * level, context, moved);
+        })) {
+      continue;
+    }
+    if (now.loose_points.empty() || !helps([&](Estimate* moved) {
+          PlacePointsRobustly(problem, now.loose_points, norm,
                               kCapOfPoints * level, context, moved);
         })) {
       return num_parts;

@@ -74,8 +74,8 @@ Eigen::Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i);
 //   5. several parts move to minima of a robust sum of squares
 //      (finish/least_squares.h) and are joined;
 //   6. all move to such a minimum. Tracks that disagree hold nothing there, so
-//      what the others do not tie is joined anew, and frames that hardly agree
-//      are placed anew, while that makes more observations agree;
+//      what the others do not tie is joined anew, and frames and points that
+//      hardly agree are placed anew, while that makes more observations agree;
 //   7. if parts are left that nothing ties, all is placed as one part, too, and
 //      the start is taken with fewer such parts or, if there are as many, with
 //      which more observations agree.
@@ -100,7 +100,8 @@ void PlaceParts(const KnownRotationProblem& problem,
 
 // MinimizeRobustly for a connected problem. As tracks that cost more than a
 // bound hold nothing, frames may have run away from the others there, alone or
-// in parts: they are placed anew, as long as more observations agree then.
+// in parts, and points: they are placed anew, as long as more observations
+// agree then.
 // Returns into how many parts the frames fall that what agrees ties; > 0.
 int32_t MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
                         double level, const Context& context,
