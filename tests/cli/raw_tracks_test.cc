@@ -135,6 +135,22 @@ TEST(WeaklyTiedTracks, AreSaidNotToHoldTheScaleOfAPart) {
   EXPECT_EQ(parts[0]["is_held"], false);
 }
 
+TEST(WrongRotations, AreNamedByTheirImages) {
+  const TempFolder folder;
+  SceneOptions options = SmallScene();
+  options.num_frames = 24;
+  options.num_points = 1500;
+  Model model = WithoutTranslations(SynthesizeScene(options).model);
+  TurnPart([](int n) { return n == 4; }, 40, &model);
+  Save(model, folder / "input");
+  const KrotResult result =
+      RunKrot({"solver", "--input_path", folder / "input", "--output_path",
+               folder / "output", "--Solver.init", "feasible"});
+  EXPECT_EQ(result.exit_code, 10) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("1 image keeps few of its observations (" +
+                                    model.images[4].name + " "));
+}
+
 TEST_F(RawTracks, WhoseLowestMaximumIsToBeProvedLoseNothing) {
   const KrotResult result =
       Solve({"--Solver.init", "feasible", "--Problem.init_max_error", "10",

@@ -368,27 +368,6 @@ TEST(FilterOutliers, SaysHowWellFewTracksHoldTheScale) {
   EXPECT_FALSE(scale_factors(1, 0).is_held);
 }
 
-// Turns the rotations of images that `is_turned` says, by their index, and of
-// the frames of the same index, about the world's y axis.
-void TurnPart(const std::function<bool(int)>& is_turned, double degrees,
-              Model* model) {
-  const Eigen::Matrix3d turn =
-      Eigen::AngleAxisd(degrees * M_PI / 180, Eigen::Vector3d::UnitY())
-          .toRotationMatrix();
-  const auto turned = [&](const Pose& pose) {
-    return ToPose({pose.Rotation() * turn, pose.translation});
-  };
-  for (size_t n = 0; n < model->images.size(); ++n) {
-    if (!is_turned(static_cast<int>(n))) continue;
-    Pose& pose = model->images[n].cam_from_world;
-    pose = turned(pose);
-    if (n < model->frames.size()) {
-      Pose& of_frame = model->frames[n].rig_from_world;
-      of_frame = turned(of_frame);
-    }
-  }
-}
-
 TEST(FilterOutliers, NamesTheFramesThatKeepFewOfTheirObservations) {
   for (const std::set<int>& turned : {std::set<int>{}, {4}, {2, 11, 19}}) {
     Model model =
@@ -439,6 +418,27 @@ TEST(FindRobustStart, FindsThePositionsOfShortTracks) {
         0.02)
         << seed;
   }
+}
+
+// What the robust least squares has lost is placed anew.
+TEST(FilterOutliers, FromNothingLosesFewRightObservations) {
+  const SyntheticScene scene = ShortTracks(0.25, 0);
+  OutlierFilterOptions options;
+  options.find_conflicts = false;
+  const OutlierFilterResult result =
+      FilterOutliers(Wiped(scene.model), options, {});
+  std::set<std::pair<ImageId, uint64_t>> wrong;
+  for (const int64_t e : scene.outliers) {
+    const TrackElement& element = scene.model.track_elements[e];
+    wrong.insert({element.image_id, element.point2D_idx});
+  }
+  int64_t num_right = 0;  // that were removed
+  for (const RemovedObservation& o : result.summary.removed) {
+    num_right += wrong.count({o.image_id, o.point2D_idx}) == 0;
+  }
+  const auto num_of_right = static_cast<double>(
+      scene.model.track_elements.size() - scene.outliers.size());
+  EXPECT_LT(static_cast<double>(num_right), 0.06 * num_of_right);
 }
 
 TEST(FilterOutliers, PlacesAModelWithoutPositions) {

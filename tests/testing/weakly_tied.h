@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <random>
@@ -8,8 +9,11 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "krot/model.h"
 #include "krot/model/derived_models.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 
@@ -66,6 +70,27 @@ inline Model WeaklyTied(Model model, const std::function<int(int)>& part_of,
     }
   }
   return RemoveObservations(model, is_removed).model;
+}
+
+// Turns the rotations of images that `is_turned` says, by their index, and of
+// the frames of the same index, about the world's y axis.
+inline void TurnPart(const std::function<bool(int)>& is_turned, double degrees,
+                     Model* model) {
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(degrees * M_PI / 180, Eigen::Vector3d::UnitY())
+          .toRotationMatrix();
+  const auto turned = [&](const Pose& pose) {
+    return ToPose({pose.Rotation() * turn, pose.translation});
+  };
+  for (size_t n = 0; n < model->images.size(); ++n) {
+    if (!is_turned(static_cast<int>(n))) continue;
+    Pose& pose = model->images[n].cam_from_world;
+    pose = turned(pose);
+    if (n < model->frames.size()) {
+      Pose& of_frame = model->frames[n].rig_from_world;
+      of_frame = turned(of_frame);
+    }
+  }
 }
 
 }  // namespace krot::internal

@@ -1,7 +1,6 @@
 #include "krot/analysis/noise.h"
 
 #include <algorithm>
-#include <array>
 #include <optional>
 
 #include <Eigen/Eigenvalues>
@@ -9,6 +8,7 @@
 
 #include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {
@@ -38,23 +38,11 @@ Eigen::Matrix<double, 4, 3> TangentBasis(const Vector4d& X) {
 // The median distance of the cameras from the median of their centres; 0
 // without cameras.
 double RadiusOfCentres(const std::vector<ImageGeometry>& geometries) {
-  std::array<std::vector<double>, 3> coordinates;
+  std::vector<Vector3d> centres;
   for (const ImageGeometry& geometry : geometries) {
-    if (!geometry.has_pose) continue;
-    const Vector3d center = Center(geometry.cam_from_world);
-    for (int i = 0; i < 3; ++i) coordinates[i].push_back(center[i]);
+    if (geometry.has_pose) centres.push_back(Center(geometry.cam_from_world));
   }
-  const size_t num = coordinates[0].size();
-  if (num == 0) return 0;
-  Vector3d middle;
-  for (int i = 0; i < 3; ++i) middle[i] = LowerMedian(coordinates[i]);
-  std::vector<double> distances(num);
-  for (size_t n = 0; n < num; ++n) {
-    const Vector3d center(coordinates[0][n], coordinates[1][n],
-                          coordinates[2][n]);
-    distances[n] = (center - middle).norm();
-  }
-  return LowerMedian(std::move(distances));
+  return centres.empty() ? 0 : MedianDistance(centres, MedianPlace(centres));
 }
 
 }  // namespace

@@ -91,6 +91,15 @@ Vector3d MedianPlace(const std::vector<Vector3d>& places) {
   return median;
 }
 
+double MedianDistance(const std::vector<Vector3d>& places,
+                      const Vector3d& from) {
+  std::vector<double> distances;
+  for (const Vector3d& place : places) {
+    distances.push_back((place - from).norm());
+  }
+  return distances.empty() ? 0 : Median(std::move(distances));
+}
+
 std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
                                 bool scale_is_free) {
   std::vector<char> keeps(cameras.size(), 1);

@@ -12,6 +12,10 @@ Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& a);
 // The median (LowerMedian) of each coordinate; requires at least one place.
 Eigen::Vector3d MedianPlace(const std::vector<Eigen::Vector3d>& places);
 
+// The median distance of places from one of them or any other; 0 without any.
+double MedianDistance(const std::vector<Eigen::Vector3d>& places,
+                      const Eigen::Vector3d& from);
+
 // A camera in two models of the same scene, whose axes are parallel.
 struct CameraMove {
   Eigen::Vector3d before = Eigen::Vector3d::Zero();  // its centre

@@ -9,6 +9,7 @@
 
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {
@@ -170,13 +171,6 @@ std::optional<Vector3d> MedianPosition(const std::vector<Vector3d>& positions) {
     median[axis] = Median(values);
   }
   return median;
-}
-
-double MedianDistance(const std::vector<Vector3d>& positions,
-                      const Vector3d& from) {
-  std::vector<double> distances;
-  for (const Vector3d& x : positions) distances.push_back((x - from).norm());
-  return distances.empty() ? 0 : Median(std::move(distances));
 }
 
 // Centres of the frames' rigs, for all frames or those that are wanted.

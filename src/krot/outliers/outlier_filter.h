@@ -36,10 +36,10 @@ struct NoiseLimit {
 
 // Estimates sigma by SnoopNoise at two sets of cameras, the model's and those
 // of FindRobustStart, and takes the smaller one: the latter does not depend on
-// the model's positions, which may be off. One of
-// N errors is above sigma sqrt(2 ln(N / 0.05)) with a probability of 5 % at
-// most (Bonferroni). The limit is at least a thousandth of a pixel, as less
-// cannot be told from rounding. Takes less than a solve.
+// the model's positions, which may be off. One of N errors is above
+// sigma sqrt(2 ln(N / 0.05)) with a probability of 5 % at most (Bonferroni).
+// The limit is at least a thousandth of a pixel, as less cannot be told from
+// rounding. Takes less than a solve.
 NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
                           Norm norm, const Context& context);
 

@@ -7,8 +7,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
+#include "krot/geometry/transform.h"
 #include "krot/outliers/parts.h"
 
 namespace krot::internal {
@@ -30,23 +30,6 @@ Eigen::Matrix<double, kSize, kSize> InverseOf(
   return (M + 1e-9 * M.trace() * M.Identity()).inverse();
 }
 
-Vector3d MedianPoint(const std::vector<Vector3d>& points) {
-  Vector3d median;
-  for (int d = 0; d < 3; ++d) {
-    std::vector<double> values;
-    for (const Vector3d& x : points) values.push_back(x(d));
-    median(d) = Median(std::move(values));
-  }
-  return median;
-}
-
-double MedianDistance(const std::vector<Vector3d>& points,
-                      const Vector3d& centre) {
-  std::vector<double> distances;
-  for (const Vector3d& x : points) distances.push_back((x - centre).norm());
-  return Median(std::move(distances));
-}
-
 // Coordinates in which the b sides of tracks, which may be small and far away,
 // are near 1, so that their shift and their scale can be told apart.
 class Unit {
@@ -58,9 +41,9 @@ class Unit {
       a.push_back(track.a.x);
       b.push_back(track.b.x);
     }
-    centre_ = MedianPoint(b);
+    centre_ = MedianPlace(b);
     length_ = MedianDistance(b, centre_);
-    scale_ = MedianDistance(a, MedianPoint(a)) / length_;
+    scale_ = MedianDistance(a, MedianPlace(a)) / length_;
   }
 
   Vector3d In(const Vector3d& x_b) const { return (x_b - centre_) / length_; }

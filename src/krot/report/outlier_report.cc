@@ -41,13 +41,16 @@ std::string WeakPartWords(const WeakPart& part) {
 }
 
 // For example "2 images keep few of their observations (P7.JPG 3 of 120, P9.JPG
-// 0 of 88): look at their rotations and matches, or leave them out"; the first
-// five are named. "" without such parts.
+// 0 of 88): look at their rotations and matches, or leave them out"; or frames,
+// by their first images, where rigs have several cameras. The first five are
+// named. "" without such parts.
 std::string LooseFrameWords(const std::vector<WeakPart>& parts) {
   int64_t count = 0;
+  const char* one = "image";
   std::string names;
   for (const WeakPart& part : parts) {
     if (!part.is_frame) continue;
+    if (part.image_names.size() > 1) one = "frame";
     if (++count > 5) continue;
     names += (names.empty() ? "" : ", ") + part.image_names.front() + " " +
              std::to_string(part.num_agreeing) + " of " +
@@ -56,7 +59,7 @@ std::string LooseFrameWords(const std::vector<WeakPart>& parts) {
   if (count == 0) return "";
   if (count > 5) names += ", ...";
   const bool is_one = count == 1;
-  return Counted(count, "image") + (is_one ? " keeps" : " keep") + " few of " +
+  return Counted(count, one) + (is_one ? " keeps" : " keep") + " few of " +
          (is_one ? "its" : "their") + " observations (" + names +
          "): look at " + (is_one ? "its" : "their") +
          " rotations and matches, or leave " + (is_one ? "it" : "them") +

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "krot/base/check.h"
@@ -65,12 +64,11 @@ ToleranceGauge GaugeFor(const ToleranceOptions& options,
                         const Context& context) {
   if (HasFixed(built.problem)) return {};
   if (options.gauge_images.empty()) {
-    std::vector<int64_t> all(built.problem.observations.size());
-    std::iota(all.begin(), all.end(), 0);
+    const auto count = static_cast<int64_t>(built.problem.observations.size());
     return ChooseGauge(
         built.problem, built.start,
-        FindFarParts(built.problem, std::move(all), options.solve.norm,
-                     options.max_error, context)
+        FindFarParts(built.problem, NumbersUpTo<int64_t>(count),
+                     options.solve.norm, options.max_error, context)
             .frames);
   }
   ToleranceGauge gauge;
