@@ -140,6 +140,8 @@ int32_t MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
                         double level, const Context& context,
                         Estimate* estimate) {
   MinimizeRobustly(problem, context, estimate);
+  // What has not helped once is not tried again: it takes a descent each.
+  bool joins_parts = true, places_frames = true;
   for (int n = 0;; ++n) {
     const double cap =
         kCapOfPoints * std::max(level, MedianError(problem, *estimate, norm));
@@ -158,16 +160,18 @@ int32_t MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
     const int32_t num_parts =
         1 + *std::max_element(part_of.begin(), part_of.end());
     if (n == 8 || context.IsCancelled()) return num_parts;
-    if (num_parts > 1 && helps([&](Estimate* moved) {
-          PlaceParts(problem, part_of, norm, level, context, {}, moved);
-        })) {
-      continue;
+    if (num_parts > 1 && joins_parts) {
+      joins_parts = helps([&](Estimate* moved) {
+        PlaceParts(problem, part_of, norm, level, context, {}, moved);
+      });
+      if (joins_parts) continue;
     }
-    if (!now.loose_frames.empty() && helps([&](Estimate* moved) {
-          PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
-                              kCapOfPoints * level, context, moved);
-        })) {
-      continue;
+    if (!now.loose_frames.empty() && places_frames) {
+      places_frames = helps([&](Estimate* moved) {
+        PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
+                            kCapOfPoints * level, context, moved);
+      });
+      if (places_frames) continue;
     }
     if (now.loose_points.empty() || !helps([&](Estimate* moved) {
           PlacePointsRobustly(problem, now.loose_points, norm,
