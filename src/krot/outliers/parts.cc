@@ -19,7 +19,7 @@ Groups::Groups(const KnownRotationProblem& problem,
       frames.push_back(problem.FrameOf(i));
     }
     SortUnique(&frames);
-    for (const int32_t frame : frames) sights_.push_back({frame, 1});
+    for (const int32_t frame : frames) sights_.push_back({frame, 1, frame});
     begin_.push_back(static_cast<int64_t>(sights_.size()));
   }
   Merge(group_of);
@@ -57,20 +57,53 @@ std::vector<GroupPair> Groups::Pairs() const {
     }
   }
   std::vector<GroupPair> pairs;
-  std::vector<int64_t> num_shared(sizes_.size(), 0);
-  std::vector<int32_t> sharing;
+  std::vector<int32_t> pair_of(sizes_.size());  // with group a, in `pairs`
+  // The pair and the frame of each track that a single frame of one of the
+  // groups sees.
+  std::vector<std::pair<int32_t, int32_t>> located;
   for (int32_t a = 0; a < static_cast<int32_t>(sizes_.size()); ++a) {
-    sharing.clear();
+    const auto begin = static_cast<int32_t>(pairs.size());
+    located.clear();
     for (const int32_t k : tracks_of[a]) {
-      for (int64_t n = begin_[k + 1] - 1; sights_[n].group > a; --n) {
-        const int32_t b = sights_[n].group;
-        if (num_shared[b]++ == 0) sharing.push_back(b);
+      const Sight* const of_a =
+          std::lower_bound(&sights_[begin_[k]], &sights_[begin_[k + 1]], a,
+                           [](const Sight& sight, int32_t group) {
+                             return sight.group < group;
+                           });
+      for (const Sight* of_b = of_a + 1; of_b < &sights_[begin_[k + 1]];
+           ++of_b) {
+        const int32_t b = of_b->group;
+        int32_t& n = pair_of[b];
+        if (n < begin || n >= static_cast<int32_t>(pairs.size()) ||
+            pairs[n].b != b) {
+          n = static_cast<int32_t>(pairs.size());
+          pairs.push_back({a, b});
+        }
+        ++pairs[n].num_tracks;
+        const auto [fewer, more] =
+            std::minmax(of_a->num_frames, of_b->num_frames);
+        if (more < std::min(2, std::max(sizes_[a], sizes_[b]))) continue;
+        ++pairs[n].num_tying;
+        if (fewer == 1 && sizes_[a] > 1 && sizes_[b] > 1) {
+          located.emplace_back(
+              n, of_a->num_frames == 1 ? of_a->frame : of_b->frame);
+        }
       }
     }
-    for (const int32_t b : sharing) {
-      pairs.push_back(
-          {a, b, static_cast<double>(std::exchange(num_shared[b], 0))});
+    std::sort(located.begin(), located.end());
+    for (auto first = located.begin(); first != located.end();) {
+      const auto pair = first->first;
+      std::ptrdiff_t most = 0;
+      while (first != located.end() && first->first == pair) {
+        const auto last = std::upper_bound(first, located.end(), *first);
+        most = std::max(most, last - first);
+        first = last;
+      }
+      pairs[pair].num_tying -= most;
     }
+  }
+  for (GroupPair& pair : pairs) {
+    pair.strength = static_cast<double>(pair.num_tracks);
   }
   return pairs;
 }
@@ -83,7 +116,7 @@ std::vector<Groups::Count> Groups::Counts() const {
       num_frames += sights_[n].num_frames;
     }
     for (int64_t n = begin_[k]; n < begin_[k + 1]; ++n) {
-      const auto [group, own] = sights_[n];
+      const auto [group, own, frame] = sights_[n];
       const int32_t others = num_frames - own;
       counts[group].num_located += others >= 2;
       if (own < std::min(2, sizes_[group])) continue;
@@ -95,29 +128,6 @@ std::vector<Groups::Count> Groups::Counts() const {
 }
 
 namespace {
-
-bool IsStronger(const GroupPair& x, const GroupPair& y) {
-  return std::make_tuple(-x.strength, x.a, x.b) <
-         std::make_tuple(-y.strength, y.a, y.b);
-}
-
-// Keeps of all pairs the strongest of each group.
-void KeepStrongest(size_t num_groups, std::vector<GroupPair>* pairs) {
-  std::vector<const GroupPair*> strongest(num_groups, nullptr);
-  for (const GroupPair& pair : *pairs) {
-    for (const int32_t group : {pair.a, pair.b}) {
-      const GroupPair*& own = strongest[group];
-      if (own == nullptr || IsStronger(pair, *own)) own = &pair;
-    }
-  }
-  std::vector<GroupPair> kept;
-  for (const GroupPair& pair : *pairs) {
-    if (strongest[pair.a] == &pair || strongest[pair.b] == &pair) {
-      kept.push_back(pair);
-    }
-  }
-  *pairs = std::move(kept);
-}
 
 // Numbers parts from 0 in the order of their first frames.
 void NumberInOrder(std::vector<int32_t>* part_of) {
@@ -134,7 +144,11 @@ void NumberInOrder(std::vector<int32_t>* part_of) {
 }  // namespace
 
 void SortStrongestFirst(std::vector<GroupPair>* pairs) {
-  std::sort(pairs->begin(), pairs->end(), IsStronger);
+  std::sort(pairs->begin(), pairs->end(),
+            [](const GroupPair& x, const GroupPair& y) {
+              return std::make_tuple(-x.strength, -x.num_tracks, x.a, x.b) <
+                     std::make_tuple(-y.strength, -y.num_tracks, y.a, y.b);
+            });
 }
 
 std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
@@ -151,35 +165,44 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
   for (bool goes_on = true; goes_on;) {
     const std::vector<int32_t>& sizes = groups.sizes();
     const std::vector<Groups::Count> counts = groups.Counts();
-    const auto is_open = [&](int32_t group) {
-      const auto [num_tracks, num_shared, num_located] = counts[group];
-      const bool is_loose =
-          num_tracks < options.min_tracks && num_tracks < num_located;
-      return sizes[group] == 1 || is_loose ||
-             (num_shared >= options.min_tracks &&
-              (!options.compares_scales || num_located >= options.min_tracks) &&
-              static_cast<double>(num_shared) >=
-                  options.min_share * static_cast<double>(num_tracks));
-    };
     std::vector<GroupPair> pairs = groups.Pairs();
+    const auto is_tied = [&](int32_t group, const GroupPair& pair) {
+      const auto [num_tracks, num_shared, num_located] = counts[group];
+      if (sizes[group] == 1 ||
+          (num_tracks < options.min_tracks && num_tracks < num_located)) {
+        return true;
+      }
+      return options.compares_scales
+                 ? pair.num_tying >= options.min_tracks
+                 : num_shared >= options.min_tracks &&
+                       static_cast<double>(num_shared) >=
+                           options.min_share * static_cast<double>(num_tracks);
+    };
     for (GroupPair& pair : pairs) {
-      pair.strength /= static_cast<double>(std::max<int64_t>(
-          1, std::min(counts[pair.a].num_tracks, counts[pair.b].num_tracks)));
+      const int64_t num_tracks =
+          options.compares_scales ? pair.num_tying : pair.num_tracks;
+      pair.strength = static_cast<double>(num_tracks) /
+                      static_cast<double>(std::max<int64_t>(
+                          1, std::min(counts[pair.a].num_tracks,
+                                      counts[pair.b].num_tracks)));
     }
-    KeepStrongest(sizes.size(), &pairs);
     SortStrongestFirst(&pairs);
-    // In each pass a group is united with at most one other, because the tracks
-    // that it shares change by that.
+    // Unites every group with the first pair that ties it. In each pass a group
+    // is united with at most one other, because the tracks that it shares
+    // change by that.
     std::vector<char> has_best(problem.num_frames, 0);
     std::vector<char> is_done(problem.num_frames, 0);
     goes_on = false;
-    for (const auto& [a, b, strength] : pairs) {
-      const bool is_best =
-          (is_open(a) && !has_best[a]) || (is_open(b) && !has_best[b]);
-      has_best[a] = has_best[b] = 1;
-      if (!is_best || is_done[a] || is_done[b]) continue;
-      is_done[a] = is_done[b] = 1;
-      sets.Unite(a, b);
+    for (const GroupPair& pair : pairs) {
+      bool is_best = false;
+      for (const int32_t group : {pair.a, pair.b}) {
+        if (has_best[group]) continue;
+        has_best[group] = is_tied(group, pair);
+        is_best = is_best || has_best[group];
+      }
+      if (!is_best || is_done[pair.a] || is_done[pair.b]) continue;
+      is_done[pair.a] = is_done[pair.b] = 1;
+      sets.Unite(pair.a, pair.b);
       goes_on = true;
     }
     find_all();

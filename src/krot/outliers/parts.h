@@ -16,7 +16,6 @@
 
 namespace krot::internal {
 
-// Leaves each value once, ascending.
 // Calls body(a, b) for about `num_tried` of the pairs a < b of [0, count),
 // spread evenly, those that are farthest apart first.
 template <typename Body>
@@ -34,7 +33,14 @@ void ForSomePairs(int64_t count, int64_t num_tried, const Body& body) {
 // Two groups of frames that share tracks.
 struct GroupPair {
   int32_t a = -1, b = -1;
-  double strength = 0;  // how many tracks both see, or their share
+  int64_t num_tracks = 0;  // that both see
+  // Of these, those that say where one group is relative to the other, and
+  // compare their scales if both have some. A track that two frames of one
+  // group and a single one of the other see says where that frame is. If that
+  // is always the same frame, the scales are free; so the tracks of the frame
+  // that has most of them do not count, unless it is all of its group.
+  int64_t num_tying = 0;
+  double strength = 0;  // num_tracks, or a share
 };
 
 // Groups of frames, and which tracks they see. O(observations).
@@ -47,8 +53,8 @@ class Groups {
   // All frames of group g go over to group new_group[g].
   void Merge(const std::vector<int32_t>& new_group);
 
-  // All pairs of groups a < b that share tracks; their strength is the number
-  // of these. O(sum over tracks of their squared numbers of groups).
+  // All pairs of groups a < b that share tracks. O(sum over tracks of their
+  // squared numbers of groups).
   std::vector<GroupPair> Pairs() const;
   // Per group.
   struct Count {
@@ -65,6 +71,7 @@ class Groups {
   struct Sight {
     int32_t group;
     int32_t num_frames;
+    int32_t frame;  // one of them
   };
 
   std::vector<int32_t> sizes_;
@@ -72,28 +79,31 @@ class Groups {
   std::vector<Sight> sights_;   // by track, then by group
 };
 
-// Pairs of the same strength are ordered by their groups' numbers.
+// Pairs of the same strength are ordered by their numbers of tracks.
 void SortStrongestFirst(std::vector<GroupPair>* pairs);
 
-// How well a group of frames must be tied to others to be no part of its own.
+// How well a group of frames must be tied to another to be no part of its own.
 inline constexpr int64_t kStrongTracks = 50;
 struct PartOptions {
-  int64_t min_tracks = kStrongTracks;  // that it shares with others
-  // Whether so many of its tracks, even of one frame, have to be located by
-  // others, too: only tracks of both kinds compare the scales.
+  // Tracks that tie both; unless scales have to be compared, those that it
+  // shares with all others together, and the share of its tracks that they are.
+  int64_t min_tracks = kStrongTracks;
   bool compares_scales = true;
-  double min_share = 0;  // the share of its tracks that it shares
+  double min_share = 0;
 };
 
 // The part of every frame, numbered from 0 in the order of their first frames.
 // The problem must be connected. All frames begin as groups of one. A group
-// that is well tied to others is united with the one that it shares most of its
-// tracks with, the strongest pair first, until no such group is left. A single
-// frame, which has no scale, always counts as tied, and so does a group with so
-// few tracks of its own that others say more about it. O(sum over tracks of
-// their squared lengths), a dozen times.
+// that is well tied to another is united with the one that ties the largest
+// share of its tracks, the strongest pair first, until no such group is left. A
+// single frame, which has no scale, always counts as tied, and so does a group
+// with so few tracks of its own that others say more about it. O(sum over
+// tracks of their squared lengths), a dozen times.
 std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
                                const PartOptions& options);
+inline int32_t NumParts(const std::vector<int32_t>& part_of) {
+  return 1 + *std::max_element(part_of.begin(), part_of.end());
+}
 // The same if only some observations tie frames, which `agrees` marks. A frame
 // of which hardly any is marked is tied by all of its own.
 std::vector<int32_t> FindParts(const KnownRotationProblem& problem,

@@ -18,8 +18,7 @@ namespace {
 // twice.
 std::vector<std::vector<int64_t>> SplitIntoParts(
     const KnownRotationProblem& problem, const std::vector<int32_t>& part_of) {
-  std::vector<std::vector<int64_t>> split(
-      *std::max_element(part_of.begin(), part_of.end()) + 1);
+  std::vector<std::vector<int64_t>> split(NumParts(part_of));
   for (int32_t k = 0; k < problem.num_points; ++k) {
     for (const int64_t i : problem.OfPoint(k)) {
       const int32_t own = part_of[problem.FrameOf(i)];
@@ -140,44 +139,44 @@ int32_t MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
                         double level, const Context& context,
                         Estimate* estimate) {
   MinimizeRobustly(problem, context, estimate);
-  // What has not helped once is not tried again: it takes a descent each.
-  bool joins_parts = true, places_frames = true;
+  // What has not helped is tried again only after something else has: it takes
+  // a descent each.
+  bool joins_parts = true, places_frames = true, places_points = true;
   for (int n = 0;; ++n) {
     const double cap =
         kCapOfPoints * std::max(level, MedianError(problem, *estimate, norm));
     const Agreement now(problem, *estimate, norm, cap);
-    // Whether clearly more agree after this; it is kept if any more do.
-    const auto helps = [&](const auto& move) {
-      Estimate moved = *estimate;
-      move(&moved);
-      MinimizeRobustly(problem, context, &moved);
-      const int64_t gain =
-          NumAgreeing(problem, moved, norm, cap) - now.num_agreeing;
-      if (gain > 0) *estimate = std::move(moved);
-      return 1000 * gain > now.num_agreeing;
-    };
     const std::vector<int32_t> part_of = FindParts(problem, now.agrees, {});
-    const int32_t num_parts =
-        1 + *std::max_element(part_of.begin(), part_of.end());
+    const int32_t num_parts = NumParts(part_of);
     if (n == 8 || context.IsCancelled()) return num_parts;
+    Estimate moved = *estimate;
+    const auto gain = [&] {
+      return NumAgreeing(problem, moved, norm, cap) - now.num_agreeing;
+    };
+    bool* tried = &places_points;
+    std::vector<int32_t> loose_points = now.loose_points;
     if (num_parts > 1 && joins_parts) {
-      joins_parts = helps([&](Estimate* moved) {
-        PlaceParts(problem, part_of, norm, level, context, {}, moved);
-      });
-      if (joins_parts) continue;
-    }
-    if (!now.loose_frames.empty() && places_frames) {
-      places_frames = helps([&](Estimate* moved) {
-        PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
-                            kCapOfPoints * level, context, moved);
-      });
-      if (places_frames) continue;
-    }
-    if (now.loose_points.empty() || !helps([&](Estimate* moved) {
-          PlacePointsRobustly(problem, now.loose_points, norm,
-                              kCapOfPoints * level, context, moved);
-        })) {
+      tried = &joins_parts;
+      PlaceParts(problem, part_of, norm, level, context, {}, &moved);
+    } else if (!now.loose_frames.empty() && places_frames) {
+      tried = &places_frames;
+      PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
+                          kCapOfPoints * level, context, &moved);
+      loose_points = Agreement(problem, moved, norm, cap).loose_points;
+    } else if (loose_points.empty() || !places_points) {
       return num_parts;
+    }
+    PlacePointsRobustly(problem, loose_points, norm, kCapOfPoints * level,
+                        context, &moved);
+    if (tried != &places_points || gain() > 0) {
+      MinimizeRobustly(problem, context, &moved);
+    }
+    const int64_t num_more = gain();
+    if (num_more > 0) *estimate = std::move(moved);
+    if (1000 * num_more > now.num_agreeing) {
+      joins_parts = places_frames = places_points = true;
+    } else {
+      *tried = false;
     }
   }
 }

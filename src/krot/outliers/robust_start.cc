@@ -81,7 +81,9 @@ Estimate StartByProgramme(const KnownRotationProblem& problem,
   Estimate own = part.Restrict(estimate);
   SlackOptions options;
   options.norm = norm;
-  options.smallest_mu = 1e-3;  // a start needs no smaller
+  // A start needs no more; where it takes longer it gets no better.
+  options.smallest_mu = 1e-2;
+  options.max_iterations = 30;
   for (int n = 1; n <= 2 && !context.IsCancelled(); ++n) {
     context.Stage("positions from rotations and tracks, programme", n, 2);
     const SlackSolution solution =
@@ -258,9 +260,7 @@ std::optional<Estimate> StartOfParts(const KnownRotationProblem& problem,
   options.compares_scales = false;
   options.min_share = 0.2;
   const std::vector<int32_t> part_of = FindParts(problem, options);
-  if (*std::max_element(part_of.begin(), part_of.end()) == 0) {
-    return std::nullopt;
-  }
+  if (NumParts(part_of) == 1) return std::nullopt;
   Estimate estimate = AllAtZero(problem);
   PlaceParts(
       problem, part_of, norm, level, context,
@@ -275,18 +275,24 @@ std::optional<Estimate> StartOfParts(const KnownRotationProblem& problem,
 
 Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
                           double level, const Context& context) {
+  const double cap = kCapOfPoints * level;
   std::optional<Estimate> of_parts =
       StartOfParts(problem, norm, level, context);
   const int32_t num_untied =
       of_parts ? MinimizeAndJoin(problem, norm, level, context, &*of_parts) : 0;
   if (num_untied == 1) return std::move(*of_parts);
+  // No start ties what too few tracks join even if all of them are right.
+  if (of_parts && MedianError(problem, *of_parts, norm) <= cap &&
+      num_untied <= NumParts(FindParts(problem, PartOptions()))) {
+    return std::move(*of_parts);
+  }
   Estimate whole = StartOfPart(problem, norm, level, context);
   const int32_t num_untied_of_whole =
       MinimizeAndJoin(problem, norm, level, context, &whole);
   if (!of_parts) return whole;
   const auto rank = [&](const Estimate& estimate, int32_t num_parts) {
-    return std::make_pair(
-        num_parts, -NumAgreeing(problem, estimate, norm, kCapOfPoints * level));
+    return std::make_pair(num_parts,
+                          -NumAgreeing(problem, estimate, norm, cap));
   };
   return std::move(rank(whole, num_untied_of_whole) <
                            rank(*of_parts, num_untied)

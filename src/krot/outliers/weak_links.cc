@@ -334,7 +334,7 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
       own_kept[i] = kept[subset.InWhole(static_cast<int64_t>(i))];
     }
     std::vector<int32_t> parts = FindParts(own, own_kept, {});
-    if (*std::max_element(parts.begin(), parts.end()) == 0) continue;
+    if (NumParts(parts) == 1) continue;
     Estimate placed = subset.Restrict(estimate);
     PlacePointsRobustly(own, AllPoints(own), Norm::L2(), cap, context, &placed);
     if (!HasBaseline(own)) NormalizeScale(own, &placed);
