@@ -38,7 +38,7 @@ std::string FlagsAt(std::uintptr_t address) {
 }
 
 TEST(HugePages, AreAskedForWhereArraysAreLarge) {
-  const std::vector<char> large(16 * kMebibyte + 1, 'x');
+  const std::vector<char> large(2 * kMebibyte + 1, 'x');
   const auto address = reinterpret_cast<std::uintptr_t>(large.data());
   EXPECT_EQ(address % (2 * kMebibyte), 0);
   EXPECT_THAT(FlagsAt(address), ::testing::HasSubstr(" hg"));

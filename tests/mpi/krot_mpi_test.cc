@@ -110,6 +110,16 @@ TEST_F(KrotMpi, WritesWhatOneProcessDoesOfRealModels) {
   }
 }
 
+// Which only the whole model tells.
+TEST_F(KrotMpi, WritesWhatOneProcessDoesOfAModelThatContradictsItself) {
+  Model model = SynthesizeScene(SmallScene()).model;
+  for (Point2D& point2D : model.images[1].points2D) {
+    if (point2D.point3D_id % 7 == 0) point2D.point3D_id = kInvalidPoint3DId;
+  }
+  Save(model, folder_ / "in");
+  ExpectSameFiles(folder_ / "in", {2, 3});
+}
+
 TEST_F(KrotMpi, RefusesInOneSentenceWhatIsForOneProcess) {
   Save(SynthesizeScene(SmallScene()).model, folder_ / "in");
   const MpiResult result =

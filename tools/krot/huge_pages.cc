@@ -28,9 +28,6 @@
 namespace {
 
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
-// Alignment takes up to one more huge page of address space, which is little
-// for arrays of this size.
-constexpr std::size_t kLarge = 8 * kHugePage;
 
 // Ordinary memory; null if there is none.
 void* TryAllocateAsEver(std::size_t size, std::size_t alignment) {
@@ -42,7 +39,8 @@ void* TryAllocateAsEver(std::size_t size, std::size_t alignment) {
 
 void* TryAllocate(std::size_t size, std::size_t alignment) {
   void* memory = nullptr;
-  if (size < kLarge ||
+  // Alignment takes up to one more huge page, but of address space alone.
+  if (size < kHugePage ||
       posix_memalign(&memory, std::max(alignment, kHugePage), size) != 0) {
     return TryAllocateAsEver(size, alignment);
   }

@@ -211,6 +211,17 @@ void AddOnContradiction(std::string* on_contradiction, OptionParser* parser) {
       "follow_images: the images; refuse: such a model is not read");
 }
 
+PoseChecks DescribeInput(const std::string& path, const Model& model,
+                         const LogOptions& log) {
+  PoseChecks poses = CheckPoses(model);
+  for (const std::string& sentence : PoseSentences(poses)) {
+    LogLine(log, 1, "warning: " + path + ": " + sentence);
+  }
+  const std::string kept = KeptWords(model);
+  if (!kept.empty()) LogLine(log, 1, path + ": " + kept);
+  return poses;
+}
+
 ValidModel ReadValidModel(const std::string& path,
                           const std::string& on_contradiction,
                           const LogOptions& log) {
@@ -220,12 +231,7 @@ ValidModel ReadValidModel(const std::string& path,
   read.model = ReadModel(path, DetectModelFormat(path));
   read.contradictions = SettleContradictions(on_contradiction, &read.model);
   ValidateModel(read.model);
-  read.poses = CheckPoses(read.model);
-  for (const std::string& sentence : PoseSentences(read.poses)) {
-    LogLine(log, 1, "warning: " + path + ": " + sentence);
-  }
-  const std::string kept = KeptWords(read.model);
-  if (!kept.empty()) LogLine(log, 1, path + ": " + kept);
+  read.poses = DescribeInput(path, read.model, log);
   if (!read.contradictions.Any()) return read;
   if (on_contradiction == "refuse") throw ModelError(read.contradictions.first);
   RequireSettled(path, read.contradictions);

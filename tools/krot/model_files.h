@@ -85,6 +85,11 @@ ValidModel ReadValidModel(const std::string& path,
                           const std::string& on_contradiction,
                           const LogOptions& log);
 
+// Warns on stderr of poses that look wrong, and says which parts of a valid
+// model take no part.
+PoseChecks DescribeInput(const std::string& path, const Model& model,
+                         const LogOptions& log);
+
 // Reads and validates the model to work on, with the rotations of
 // paths.rotations_path if there are some, and fills in what `run` says about
 // the input. Throws ModelError, and CommandError if the model has no

@@ -317,7 +317,9 @@ int RunSolveCommand(const SolveCommand& command) {
   SolveReport report = DescribeRun(command);
 
   const bool has_database = !command.database_path.empty();
-  Model model = ReadInput(paths, log, &report.run, !has_database);
+  Model model = command.read
+                    ? command.read(&report.run)
+                    : ReadInput(paths, log, &report.run, !has_database);
   double seconds_placed = 0;
   if (has_database) {
     model = PlaceByMatches(command, model, &report, &seconds_placed);
@@ -325,7 +327,7 @@ int RunSolveCommand(const SolveCommand& command) {
   report.distances = ReadKnownDistances(paths, model, log);
   const std::unique_ptr<Checkpoint> checkpoint =
       OpenCheckpoint(command.checkpoint, paths, model, command.context, log);
-  if (command.take_share) model = command.take_share(model);
+  if (command.take_share) model = command.take_share(std::move(model));
 
   Context context = command.context;
   if (paths.write_on_interrupt || command.checkpoint.is_all) {

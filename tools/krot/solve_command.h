@@ -28,11 +28,12 @@ struct SolveCommand {
   TolerantSolveOptions options;  // its callbacks are set by the run
   Context context;               // likewise, and so is the flag
 
-  // For several processes that solve the model together (tools/krot_mpi):
-  // take_share gives the part that this process solves; join puts the whole
-  // together, as it was read and as it is solved, in the process that writes
-  // it. Empty: this process has it all.
-  std::function<Model(const Model& whole)> take_share;
+  // For several processes that solve the model together (tools/krot_mpi): read
+  // gives the model or this process's part of it, take_share the part that this
+  // process solves; join puts the whole together, as it was read and as it is
+  // solved, in the process that writes it. Empty: this process has it all.
+  std::function<Model(RunRecord* run)> read;
+  std::function<Model(Model read)> take_share;
   std::function<bool(Model* model, Model* solved, SolveSummary* summary)> join;
 };
 

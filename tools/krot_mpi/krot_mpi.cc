@@ -8,6 +8,7 @@
 #include <numeric>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "krot/adjust/bundle_adjustment.h"
@@ -69,7 +70,11 @@ int RunSharedSolver(const std::vector<std::string>& arguments,
   if (!ranks->IsFirst()) command.common.log.level = -1;
 
   SharedModel shared(command.paths, ranks);
-  command.take_share = [&](const Model& whole) { return shared.Take(whole); };
+  const bool has_checkpoint = !command.checkpoint.path.empty();
+  command.read = [&](RunRecord* run) {
+    return shared.Read(has_checkpoint, command.common.log, run);
+  };
+  command.take_share = [&](Model read) { return shared.Take(std::move(read)); };
   command.join = [&](Model* model, Model* solved, SolveSummary* summary) {
     const std::string words = TrafficWords(ranks);
     LogLine(command.common.log, 2, words);

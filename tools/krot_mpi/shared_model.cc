@@ -1,6 +1,7 @@
 #include "tools/krot_mpi/shared_model.h"
 
 #include <algorithm>
+#include <optional>
 #include <unordered_set>
 #include <utility>
 #include <vector>
@@ -26,9 +27,38 @@ struct Named {
 
 }  // namespace
 
-Model SharedModel::Take(const Model& whole) {
+Model SharedModel::Read(bool first_needs_whole, const LogOptions& log,
+                        RunRecord* run) {
+  std::optional<Model> whole;
+  std::optional<ModelShare> share;
+  // Other rotations are compared with those of the whole model.
+  const bool may_share = paths_.rotations_path.empty();
+  if (may_share && first_needs_whole && ranks_.IsFirst()) {
+    whole = ReadInput(paths_, log, run);
+  } else if (may_share) {
+    BeginPhase(log, "reading " + paths_.input_path);
+    const Timer timer;
+    share = ReadShare(paths_.input_path, ranks_.count(), ranks_.rank());
+    run->seconds_read = timer.Seconds();
+  }
+  const bool agrees = share || (whole && !run->contradictions.Any());
+  const std::vector<char> all_agree = ranks_.Gather(std::vector<char>{agrees});
+  is_share_ = false;
+  if (std::count(all_agree.begin(), all_agree.end(), 0) > 0) {
+    share.reset();
+    return whole ? *std::move(whole) : ReadInput(paths_, log, run);
+  }
+  if (whole) return *std::move(whole);
+  is_share_ = true;
+  point2D_of_ = std::move(share->point2D_of);
+  run->poses = DescribeInput(paths_.input_path, share->model, log);
+  return std::move(share->model);
+}
+
+Model SharedModel::Take(Model read) {
+  if (is_share_) return read;
   ModelShare share =
-      TakeShare(whole, CutPoints(whole, ranks_.count())[ranks_.rank()]);
+      TakeShare(read, CutPoints(read, ranks_.count())[ranks_.rank()]);
   point2D_of_ = std::move(share.point2D_of);
   return std::move(share.model);
 }

@@ -7,8 +7,9 @@
 
 namespace krot::internal {
 
-// A model that ranks solve together. Every rank reads it and keeps its share;
-// during the solve no rank has all observations. After the solve the first rank
+// A model that ranks solve together. Every rank reads its share; where that
+// needs the whole model (ReadShare), it reads all and keeps its share. During
+// the solve no rank has all observations. After the solve the first rank
 // reads the model again and receives the results of all ranks.
 class SharedModel {
  public:
@@ -16,8 +17,12 @@ class SharedModel {
   SharedModel(const ModelPaths& paths, Ranks* ranks)
       : paths_(paths), ranks_(*ranks) {}
 
-  // Returns this rank's share of the points.
-  Model Take(const Model& whole);
+  // Returns this rank's share of the points, or the whole model: on all ranks,
+  // or if `first_needs_whole` on the first. Every rank must call it.
+  Model Read(bool first_needs_whole, const LogOptions& log, RunRecord* run);
+
+  // Returns this rank's share of what it has read.
+  Model Take(Model read);
 
   // Joins the shares after the solve; every rank must call it. On the first
   // rank `*solved` becomes the whole solved model, and the summary refers to
@@ -33,6 +38,7 @@ class SharedModel {
 
   const ModelPaths& paths_;
   Ranks& ranks_;
+  bool is_share_ = false;                          // what Read has returned
   std::vector<std::vector<uint32_t>> point2D_of_;  // see ModelShare
 };
 

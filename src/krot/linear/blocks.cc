@@ -165,39 +165,73 @@ SparseFactorSize FindSparseFactorSize(const BlockPattern& pattern) {
 
 namespace {
 
-// column -= q q'column; returns q'column. Done twice, Gram-Schmidt is as
-// orthogonal as Householder's reflections [Giraud, Langou, Rozloznik 2005].
-double Subtract(const double* q, int64_t n, double* column) {
-  double dot = 0;
-  for (int64_t i = 0; i < n; ++i) dot += q[3 * i] * column[3 * i];
-  for (int64_t i = 0; i < n; ++i) column[3 * i] -= dot * q[3 * i];
-  return dot;
-}
+// The square root of what is left of a column's squared length, `was` before;
+// none if that is next to nothing: then the column is a combination of the ones
+// before it.
+struct Pivot {
+  Pivot(double left, double was) : norm(std::sqrt(left)) {
+    const bool is_free = !(norm > 1e-13 * std::sqrt(was));
+    if (is_free) norm = std::numeric_limits<double>::infinity();
+    scale = is_free ? 0 : 1 / norm;
+  }
 
-double ColumnNorm(const double* column, int64_t n) {
-  double sum = 0;
-  for (int64_t i = 0; i < n; ++i) sum += column[3 * i] * column[3 * i];
-  return std::sqrt(sum);
-}
+  double norm, scale;
+};
 
 }  // namespace
 
+// Gram and Schmidt's method, which is as orthogonal as Householder's
+// reflections where what is left of a column is projected twice [Giraud,
+// Langou, Rozloznik 2005]. The sums that a step needs are formed while the step
+// before goes through the rows.
 UpperTriangle Orthogonalize(int64_t n, double* rows) {
-  double R[3][3] = {};
-  for (int c = 0; c < 3; ++c) {
-    const double norm_before = ColumnNorm(rows + c, n);
-    for (int pass = 0; pass < 2; ++pass) {
-      for (int b = 0; b < c; ++b) R[b][c] += Subtract(rows + b, n, rows + c);
-    }
-    const double norm = ColumnNorm(rows + c, n);
-    // If next to nothing is left of a column, it is a combination of the ones
-    // before it.
-    const bool is_free = !(norm > 1e-13 * norm_before);
-    R[c][c] = is_free ? std::numeric_limits<double>::infinity() : norm;
-    const double scale = is_free ? 0 : 1 / norm;
-    for (int64_t i = 0; i < n; ++i) rows[3 * i + c] *= scale;
+  double* const end = rows + 3 * n;
+  double xx = 0, xy = 0, xz = 0, yy = 0, zz = 0;
+  for (const double* r = rows; r != end; r += 3) {
+    xx += r[0] * r[0];
+    xy += r[0] * r[1];
+    xz += r[0] * r[2];
+    yy += r[1] * r[1];
+    zz += r[2] * r[2];
   }
-  return {R[0][0], R[0][1], R[0][2], R[1][1], R[1][2], R[2][2]};
+  const Pivot x(xx, xx);
+  double R_xy = xy * x.scale, R_xz = xz * x.scale;
+  double y_left = 0, z_left = 0;
+  for (double* r = rows; r != end; r += 3) {
+    r[0] *= x.scale;
+    r[1] -= R_xy * r[0];
+    r[2] -= R_xz * r[0];
+    y_left += r[0] * r[1];
+    z_left += r[0] * r[2];
+  }
+  double yy_left = 0, yz = 0;
+  for (double* r = rows; r != end; r += 3) {
+    r[1] -= y_left * r[0];
+    r[2] -= z_left * r[0];
+    yy_left += r[1] * r[1];
+    yz += r[1] * r[2];
+  }
+  R_xy += y_left;
+  R_xz += z_left;
+  const Pivot y(yy_left, yy);
+  double R_yz = yz * y.scale;
+  double xz_left = 0, yz_left = 0;
+  for (double* r = rows; r != end; r += 3) {
+    r[1] *= y.scale;
+    r[2] -= R_yz * r[1];
+    xz_left += r[0] * r[2];
+    yz_left += r[1] * r[2];
+  }
+  double zz_left = 0;
+  for (double* r = rows; r != end; r += 3) {
+    r[2] -= xz_left * r[0] + yz_left * r[1];
+    zz_left += r[2] * r[2];
+  }
+  R_xz += xz_left;
+  R_yz += yz_left;
+  const Pivot z(zz_left, zz);
+  for (double* r = rows; r != end; r += 3) r[2] *= z.scale;
+  return {x.norm, R_xy, R_xz, y.norm, R_yz, z.norm};
 }
 
 }  // namespace krot::internal

@@ -135,9 +135,11 @@ ReducedCameraSystem::Block ReducedCameraSystem::BlockOf(int part, int32_t a,
   const int32_t col = column(b) / 3;
   const int64_t begin = pattern_.begin[col];
   const int64_t end = pattern_.begin[col + 1];
-  // Where a column has no gaps, as in a band, no search is necessary.
+  // Where a column has no gaps, as in a band, no search is necessary; in one
+  // without zeros, not even a look.
   int64_t n = row - col;
-  if (n >= end - begin || pattern_.row[begin + n] != row) {
+  const bool is_full = end - begin == pattern_.num_columns() - col;
+  if (!is_full && (n >= end - begin || pattern_.row[begin + n] != row)) {
     n = std::lower_bound(pattern_.row.begin() + begin,
                          pattern_.row.begin() + end, row) -
         pattern_.row.begin() - begin;

@@ -14,23 +14,35 @@
 
 namespace krot::internal {
 
-std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count) {
+std::vector<std::vector<int32_t>> CutPoints(
+    const std::vector<TrackLength>& tracks, int count) {
   std::vector<std::vector<int32_t>> cut(count);
-  const auto total = static_cast<int64_t>(whole.track_elements.size());
+  int64_t total = 0;
+  for (const TrackLength& track : tracks) {
+    total += static_cast<int64_t>(track.length);
+  }
   // The number of observations in all shares up to and including this one.
   const auto end_of = [&](int share) { return total * (share + 1) / count; };
   int64_t sum = 0;
   int share = 0;
-  for (const int32_t k : OrderOfIds(whole.points3D)) {
+  for (const int32_t k : OrderOfIds(tracks)) {
     while (share + 1 < count && sum >= end_of(share)) ++share;
     cut[share].push_back(k);
-    const Point3D& point = whole.points3D[k];
-    sum += static_cast<int64_t>(point.track_end - point.track_begin);
+    sum += static_cast<int64_t>(tracks[k].length);
   }
   for (std::vector<int32_t>& points : cut) {
     std::sort(points.begin(), points.end());
   }
   return cut;
+}
+
+std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count) {
+  std::vector<TrackLength> tracks;
+  tracks.reserve(whole.points3D.size());
+  for (const Point3D& point : whole.points3D) {
+    tracks.push_back({point.id, point.track_end - point.track_begin});
+  }
+  return CutPoints(tracks, count);
 }
 
 Model WithoutPoints(const Model& model) {

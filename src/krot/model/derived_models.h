@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -10,10 +12,17 @@
 
 namespace krot::internal {
 
+// A point, and how many observations it has.
+struct TrackLength {
+  Point3DId id;
+  uint64_t length;
+};
+
 // Divides a model's points among `count` processes, with about as many
 // observations each. Every process gets consecutive points in the order of
-// their ids; they are returned as indices of points3D, ascending. O(points log
-// points).
+// their ids; they are returned as indices, ascending. O(points log points).
+std::vector<std::vector<int32_t>> CutPoints(
+    const std::vector<TrackLength>& tracks, int count);
 std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count);
 
 // The model's cameras, rigs, frames and images, without 2D points and tracks.
@@ -31,6 +40,17 @@ struct ModelShare {
 // Makes the part of one process; `points` as CutPoints gives them. Requires a
 // valid model (ValidateModel).
 ModelShare TakeShare(const Model& whole, const std::vector<int32_t>& points);
+
+// Reads the share of one of `count` processes from a folder of binary files:
+// TakeShare of the whole model, of which no more is in memory than the share,
+// one image's 2D points, and some 30 bytes for every point. None if only the
+// whole model tells what is to be done: if it is text, or if anything in the
+// share is not as in a valid model (ValidateModel) that agrees with itself
+// (FindContradictions) and whose 2D points are all finite. If every process
+// gets a share, nothing in the whole is. O(bytes of the files): each process
+// reads points3D twice.
+std::optional<ModelShare> ReadShare(const std::filesystem::path& folder,
+                                    int count, int rank);
 
 struct RemovedObservations {
   Model model;

@@ -1,6 +1,7 @@
 #include "krot/model/model_io.h"
 
 #include <cerrno>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -61,6 +62,11 @@ struct ModelPart {
     return std::string(name) +
            (format == ModelFormat::kBinary ? ".bin" : ".txt");
   }
+  void Read(const fs::path& folder, ModelFormat format, Model* model) const {
+    const auto parse =
+        format == ModelFormat::kBinary ? parse_binary : parse_text;
+    parse(ReadFileBytes(folder / FileName(format)), model);
+  }
 };
 
 // The files in the order in which COLMAP reads them.
@@ -76,6 +82,9 @@ const ModelPart kParts[] = {
     {"points3D", false, ParsePoints3DBinary, ParsePoints3DText,
      FormatPoints3DBinary, FormatPoints3DText},
 };
+
+// After cameras, rigs and frames.
+const ModelPart* const kImages = kParts + 3;
 
 constexpr ModelFormat kFormats[] = {ModelFormat::kBinary, ModelFormat::kText};
 
@@ -175,6 +184,23 @@ void WriteModelFiles(const Model& model, ModelFormat format,
 
 }  // namespace
 
+Model ReadWithoutImages(const fs::path& folder, ModelFormat format) {
+  const bool has_rig_files = Translating<ModelError>(
+      folder, "read", [&] { return HasRigs(folder, format); });
+  Model model;
+  for (const ModelPart* part = kParts; part != kImages; ++part) {
+    if (part->is_optional && !has_rig_files) continue;
+    part->Read(folder, format, &model);
+  }
+  return model;
+}
+
+void CompleteRigs(Model* model) {
+  // Like COLMAP, treats a model with empty rigs and frames as a legacy one.
+  model->stores_rigs = !model->rigs.empty() || !model->frames.empty();
+  if (!model->stores_rigs) UseTrivialRigs(model);
+}
+
 std::vector<std::string> ImageNamesWithWhiteSpace(const Model& model) {
   std::vector<std::string> names;
   for (const Image& image : model.images) {
@@ -208,18 +234,11 @@ ModelFormat DetectModelFormat(const fs::path& folder) {
 }
 
 Model ReadModel(const fs::path& folder, ModelFormat format) {
-  const bool has_rig_files = Translating<ModelError>(
-      folder, "read", [&] { return HasRigs(folder, format); });
-  Model model;
-  for (const ModelPart& part : kParts) {
-    if (part.is_optional && !has_rig_files) continue;
-    const auto parse_part =
-        format == ModelFormat::kBinary ? part.parse_binary : part.parse_text;
-    parse_part(ReadFileBytes(folder / part.FileName(format)), &model);
+  Model model = ReadWithoutImages(folder, format);
+  for (const ModelPart* part = kImages; part != std::end(kParts); ++part) {
+    part->Read(folder, format, &model);
   }
-  // Like COLMAP, treats a model with empty rigs and frames as a legacy one.
-  model.stores_rigs = !model.rigs.empty() || !model.frames.empty();
-  if (!model.stores_rigs) UseTrivialRigs(&model);
+  CompleteRigs(&model);
   return model;
 }
 

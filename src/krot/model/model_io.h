@@ -29,6 +29,13 @@ using FileNote = std::function<void(const std::string& sentence)>;
 // file itself.
 FileBytes ReadFileBytes(const std::filesystem::path& path);
 
+// What ReadModel reads before the images: cameras, and rigs and frames if the
+// folder has them. Throws ModelError.
+Model ReadWithoutImages(const std::filesystem::path& folder,
+                        ModelFormat format);
+// Once there are images: makes rigs and frames if the files hold none.
+void CompleteRigs(Model* model);
+
 // The image names that COLMAP's text reader would cut at their first white
 // space, in the order of the images. KROT reads them whole, so the user should
 // be warned before they are written as text.

@@ -347,6 +347,7 @@ TolerantSolveResult SolveTolerantly(const Model& model,
       return {std::move(solved.model), std::move(solved.summary), std::nullopt};
     }
   }
+  RequireOneRank(context, "a start from nothing");
   const bool keeps_all = is_from_nothing && solve.describe_certificate;
   TolerantSolveResult result = SolveWithoutOutliers(
       model, options,
