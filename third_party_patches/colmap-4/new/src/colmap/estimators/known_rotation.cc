@@ -290,6 +290,7 @@ bool RunKnownRotationPositioning(const GlobalPositionerOptions& options,
   krot::internal::OutlierFilterOptions filter_options;
   filter_options.solve.init = krot::SolveInit::kFeasible;
   filter_options.find_conflicts = false;
+  filter_options.solve.find_lowest = false;  // A bundle adjustment follows.
   if (options.krot_max_error > 0) {
     filter_options.max_error = options.krot_max_error;
   }
