@@ -52,6 +52,12 @@ file(RENAME ${prefix} ${moved})
 run(${CMAKE_COMMAND} -S ${EXAMPLES_DIR} -B ${SCRATCH_DIR}/build
     -G ${GENERATOR} -DCMAKE_BUILD_TYPE=None -DCMAKE_PREFIX_PATH=${moved}
     -DCMAKE_CXX_COMPILER=${CXX_COMPILER} -DCMAKE_CXX_FLAGS=${CXX_FLAGS})
+# The project may have a module of its own for what KROT needs, as COLMAP 3.8 has.
+file(WRITE ${SCRATCH_DIR}/modules/FindSQLite3.cmake "set(SQLite3_FOUND TRUE)\n")
+run(${CMAKE_COMMAND} -S ${EXAMPLES_DIR} -B ${SCRATCH_DIR}/own_module
+    -G ${GENERATOR} -DCMAKE_BUILD_TYPE=None -DCMAKE_PREFIX_PATH=${moved}
+    -DCMAKE_CXX_COMPILER=${CXX_COMPILER} -DCMAKE_CXX_FLAGS=${CXX_FLAGS}
+    -DCMAKE_MODULE_PATH=${SCRATCH_DIR}/modules)
 run(${CMAKE_COMMAND} --build ${SCRATCH_DIR}/build)
 set(examples ${SCRATCH_DIR}/build)
 set(certificate ${SCRATCH_DIR}/certificate.json)

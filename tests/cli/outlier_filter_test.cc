@@ -131,6 +131,8 @@ TEST_F(OutlierFilterCommand, TakesItsBoundFromTheElbowOfTheProfile) {
   EXPECT_TRUE(report["is_within"]);
   EXPECT_LE(levels.back()["max_error"].get<double>(),
             0.5 * levels[0]["max_error"].get<double>());
+  EXPECT_NE(result.out.find("made the profile in "), std::string::npos)
+      << result.out;
   EXPECT_EQ(Check("c.json").exit_code, 0);
 }
 

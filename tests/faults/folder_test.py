@@ -58,6 +58,9 @@ def full_disk(krot, command, stride):
             refused += result.returncode != 0
             wrong += [f"{pages} pages left: {line}"
                       for line in place.judge(result, (0, 5))]
+            if ".krot-" in "".join(result.stderr.splitlines()[-1:]):
+                wrong.append(f"{pages} pages left: a name that nobody knows: "
+                             + result.stderr)
             if result.returncode == 0:
                 return refused, 1, wrong
         return refused, 0, wrong + ["it never went well"]

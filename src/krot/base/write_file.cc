@@ -67,10 +67,11 @@ void CheckFileWritable(const fs::path& file, const fs::path& folder_to_come) {
   }
 }
 
-void WriteFile(const fs::path& file, std::string_view contents) {
+void WriteFile(const fs::path& file, std::string_view contents,
+               const fs::path& final_name) {
   if (const std::optional<Failure> failure = TryToWrite(file, contents)) {
-    throw WriteError(file.string() + ": cannot be " + failure->action + ": " +
-                     failure->reason);
+    throw WriteError((final_name.empty() ? file : final_name).string() +
+                     ": cannot be " + failure->action + ": " + failure->reason);
   }
 }
 

@@ -20,8 +20,10 @@ void CheckFileWritable(const std::filesystem::path& file,
                        const std::filesystem::path& folder_to_come = {});
 
 // Creates `file` or replaces its content, and forces it to the disk. Throws
-// WriteError if it cannot be written in full.
-void WriteFile(const std::filesystem::path& file, std::string_view contents);
+// WriteError if it cannot be written in full, which names `final_name`, if that
+// is where it will be in the end.
+void WriteFile(const std::filesystem::path& file, std::string_view contents,
+               const std::filesystem::path& final_name = {});
 
 // Does the same to a new file beside `file`, which is then renamed, so that an
 // interruption leaves either the old file or the new one. Throws WriteError.

@@ -172,13 +172,15 @@ bool HasRigs(const fs::path& folder, ModelFormat format) {
   return missing.empty();
 }
 
+// Into `staging`, which becomes `folder`.
 void WriteModelFiles(const Model& model, ModelFormat format,
-                     const fs::path& folder) {
+                     const fs::path& staging, const fs::path& folder) {
   for (const ModelPart& part : kParts) {
     if (part.is_optional && !model.stores_rigs) continue;
     const auto format_part =
         format == ModelFormat::kBinary ? part.format_binary : part.format_text;
-    WriteFile(folder / part.FileName(format), format_part(model));
+    const std::string name = part.FileName(format);
+    WriteFile(staging / name, format_part(model), folder / name);
   }
 }
 
@@ -268,7 +270,7 @@ void WriteModel(const Model& model, const fs::path& folder,
   CheckWritable(folder, options);
   Translating<WriteError>(folder, "written", [&] {
     FolderSwap swap(folder, options.on_note);
-    WriteModelFiles(model, options.format, swap.staging());
+    WriteModelFiles(model, options.format, swap.staging(), folder);
     const fs::path project = options.copy_project_from / "project.ini";
     if (!options.copy_project_from.empty() && fs::exists(project)) {
       fs::copy_file(project, swap.staging() / project.filename());

@@ -281,7 +281,11 @@ std::string OutlierTable(const OutlierReport& report) {
   return text +
          RunSentence(
              report.run,
-             "chose " + FormatNumber(summary.seconds_removal, 2) +
+             (summary.profile
+                  ? "made the profile in " +
+                        FormatNumber(summary.profile->seconds, 2) + " s, "
+                  : std::string()) +
+                 "chose " + FormatNumber(summary.seconds_removal, 2) +
                  " s, proved " + FormatNumber(summary.seconds_conflicts, 2) +
                  " s, solved " + FormatNumber(summary.seconds_solve, 2) + " s");
 }

@@ -13,6 +13,7 @@
 #include <fstream>
 #include <future>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -73,6 +74,12 @@ krot::internal::Finish ToKrotFinish(const KnownRotationFinish finish) {
   return finish == KnownRotationFinish::NONE
              ? krot::internal::Finish::kNone
              : krot::internal::Finish::kLeastSquares;
+}
+
+// Positions from nothing may not be determined well enough.
+void WarnIfUnreliable(const krot::internal::OutlierFilterSummary& summary) {
+  const std::string sentence = krot::internal::UnreliableSentence(summary);
+  if (!sentence.empty()) LOG(WARNING) << sentence;
 }
 
 // A solve without a new model.
@@ -192,6 +199,7 @@ bool SolveKnownRotation(const KnownRotationOptions& options,
   if (result.outliers) {
     LOG(INFO) << "Observations: "
               << krot::internal::BracketSentence(*result.outliers);
+    WarnIfUnreliable(*result.outliers);
   }
   LogErrors(result.summary.pixel_error_before,
             result.summary.pixel_error_after);
@@ -225,6 +233,7 @@ bool FilterOutliers(const OutlierFilterOptions& options,
   }
   LOG(INFO) << "Observations: "
             << krot::internal::BracketSentence(result.summary);
+  WarnIfUnreliable(result.summary);
   LogErrors(result.summary.pixel_error_before,
             result.summary.pixel_error_after);
   UpdateFromKrotModel(result.model, reconstruction);
@@ -281,6 +290,7 @@ bool RunKnownRotationPositioning(const GlobalPositionerOptions& options,
   krot::internal::OutlierFilterOptions filter_options;
   filter_options.solve.init = krot::SolveInit::kFeasible;
   filter_options.find_conflicts = false;
+  filter_options.solve.find_lowest = false;  // A bundle adjustment follows.
   if (options.krot_max_error > 0) {
     filter_options.max_error = options.krot_max_error;
   }
@@ -303,6 +313,7 @@ bool RunKnownRotationPositioning(const GlobalPositionerOptions& options,
             << krot::internal::BracketSentence(result.summary)
             << "; largest reprojection error of the others: "
             << result.summary.pixel_error_after.max << "px";
+  WarnIfUnreliable(result.summary);
   UpdateFromKrotModel(result.model, reconstruction);
   return true;
 }

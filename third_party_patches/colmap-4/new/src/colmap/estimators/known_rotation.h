@@ -26,7 +26,8 @@ struct KnownRotationOptions {
   KnownRotationInit init = KnownRotationInit::MODEL;
 
   // Pixels. Above 0: few observations are left out so that all others are
-  // within it. 0: all observations stay.
+  // within it. 0: all observations stay. With FEASIBLE, 0 leaves out what noise
+  // does not explain, unless the reconstruction's own positions fit.
   double max_error = 0.0;
 
   // How far the largest error may be above the proved lower bound, relative to

@@ -56,7 +56,8 @@ int RunKnownRotationSolver(int argc, char** argv) {
   options.AddDefaultOption("KnownRotation.max_error",
                            &known_rotation.max_error,
                            "Leave out few observations so that all others are "
-                           "within so many pixels; 0: leave out none");
+                           "within so many pixels; 0: none, or with "
+                           "FEASIBLE what noise does not explain");
   options.AddDefaultOption("KnownRotation.relative_gap",
                            &known_rotation.relative_gap,
                            "How far the largest error may be above the proved "

@@ -58,7 +58,8 @@ void BindKnownRotation(py::module& m) {
       .def_readwrite("max_error",
                      &Solver::max_error,
                      "Pixels; few observations are left out so that all others "
-                     "are within it. 0: all observations stay.")
+                     "are within it. 0: all observations stay or, with FEASIBLE, "
+                     "those that noise explains.")
       .def_readwrite("relative_gap",
                      &Solver::relative_gap,
                      "How far the largest error may be above the proved lower "
