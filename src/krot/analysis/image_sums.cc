@@ -35,20 +35,30 @@ struct PoseRow {
   Matrix26 F;  // by the camera's rotation (from the left) and centre
 };
 
-void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
+// One observation's part in the sums.
+ImageSums SumsOf(const PoseRow& row, const Eigen::Matrix2d& R) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> of_R;
   of_R.computeDirect(R);
+  ImageSums own;
   for (int j = 0; j < 2; ++j) {
     const double r = of_R.eigenvalues()[j];
     if (r < kControlled) continue;
     const Vector2d direction = of_R.eigenvectors().col(j);
     const Vector6 f = row.F.transpose() * direction;
     const double along = direction.dot(row.error);
-    sums->M.noalias() += r * f * f.transpose();
-    sums->g.noalias() += along * f;
-    sums->square += along * along / r;
-    ++sums->num_directions;
+    own.M.noalias() += r * f * f.transpose();
+    own.g.noalias() += along * f;
+    own.square += along * along / r;
+    ++own.num_directions;
   }
+  return own;
+}
+
+void Add(const ImageSums& own, double weight, ImageSums* sums) {
+  sums->M += weight * own.M;
+  sums->g += weight * own.g;
+  sums->square += weight * own.square;
+  sums->num_directions += own.num_directions;
 }
 
 // Finds the step. As rotations and centres have different units, the diagonal
@@ -87,6 +97,7 @@ class ImageAdder {
   std::vector<ImageSums> Run() {
     const std::vector<ImageGeometry> geometries = ImageGeometries(model_);
     sums_.assign(model_.images.size(), {});
+    robust_ = sums_;
     std::vector<std::vector<double>> distances(model_.images.size());
     for (size_t k = 0; k < model_.points3D.size(); ++k) {
       const Point3D& point = model_.points3D[k];
@@ -106,7 +117,11 @@ class ImageAdder {
     for (size_t k = 0; k < model_.points3D.size(); ++k) {
       AddTrack(k, geometries);
     }
-    for (ImageSums& sums : sums_) Solve(&sums);
+    for (size_t n = 0; n < sums_.size(); ++n) {
+      Solve(&sums_[n]);
+      Solve(&robust_[n]);
+      sums_[n].robust_gain_share = robust_[n].GainShare();
+    }
     return std::move(sums_);
   }
 
@@ -143,14 +158,22 @@ class ImageAdder {
     for (const PoseRow& row : rows) {
       const Matrix23 B = row.F.rightCols<3>() * root;
       const Eigen::Matrix2d R = Eigen::Matrix2d::Identity() - B * B.transpose();
-      Add(row, R, &sums_[row.image]);
+      const ImageSums own = SumsOf(row, R);
+      Add(own, 1, &sums_[row.image]);
+      Add(own, WeightOf(own.square), &robust_[row.image]);
     }
+  }
+
+  // Of the Cauchy loss.
+  double WeightOf(double square) const {
+    if (!noise_.cauchy_scale_px) return 1;
+    return 1 / (1 + square / std::pow(*noise_.cauchy_scale_px, 2));
   }
 
   const Model& model_;
   const ModelNoise& noise_;
   const std::vector<int32_t> image_of_;  // by track element
-  std::vector<ImageSums> sums_;
+  std::vector<ImageSums> sums_, robust_;
   std::vector<double> nearest_;  // distance of a point, by image; scene units
 };
 

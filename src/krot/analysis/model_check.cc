@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "krot/analysis/model_parts.h"
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
@@ -61,6 +62,10 @@ class Checker {
     do {
       snooping_ = SnoopNoise(model_, noise_options_, context_);
       if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
+      // Images that go must not change what is taken for noise.
+      if (!snooping_.has_common_noise) {
+        noise_options_.sigma_px = snooping_.noise.sigma_px;
+      }
       Count();
       sums_ = AddUpImages(model_, snooping_.noise);
     } while (CallWrong(WorstImage()) || CallUnsupported());
@@ -314,6 +319,7 @@ class Checker {
                                      one.w, one.error_px, one.is_of_two});
     }
     check_.points = snooping_.noise.points;
+    check_.parts = FindLooseParts(model_, snooping_.noise);
   }
 
   // Snoops what was removed of each track by itself: does it agree on a point?

@@ -8,6 +8,7 @@
 
 #include "krot/check.h"
 #include "krot/model.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 
@@ -31,10 +32,12 @@ struct SnoopedObservation {
 struct NoiseSnooping {
   ModelNoise noise;                         // of what is left
   std::vector<SnoopedObservation> removed;  // largest w first
-  // Before each removal, and at last. It is kept as it was at first if it fell,
-  // when measured anew, until more than half of the observations were gone.
-  // This happens where observations have no common noise.
+  // Before each removal, and at last.
   std::vector<double> sigma_path_px;
+  // False if sigma, by the median, fell until more than half of the
+  // observations were gone. Then it is such that three quarters of the w^2 are
+  // below their quantile of chi^2.
+  bool has_common_noise = true;
 };
 
 // Relative to the largest eigenvalue of a sum of squares: less is rounding.
@@ -64,6 +67,9 @@ double CriticalW(int64_t num_tested, double false_alarm,
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
                          const Context& context);
 
+// A point nearer than this lies in its camera; scene units.
+double LeastDistance(const std::vector<ImageGeometry>& geometries);
+
 // All tracks of a model, each fitted by itself with the cameras as they stand,
 // and which of their observations take part.
 class TrackNoise {
@@ -92,8 +98,8 @@ class TrackNoise {
   // The error of any observation, pixels, at its point's present place; not
   // finite if it does not see that.
   Eigen::Vector2d ErrorOf(uint64_t e) const;
-  // The fitted place of point k; the model's place if that is at infinity, or
-  // if the point was not fitted.
+  // The fitted place of point k; the model's place if that is at infinity or in
+  // a camera that sees it, or if the point was not fitted.
   Eigen::Vector3d Point(int64_t k) const;
 
  private:
@@ -120,6 +126,7 @@ class TrackNoise {
   std::vector<ObservationNoise> observations_;
   std::vector<double> squared_errors_;
   std::vector<Eigen::Vector4d> points_;  // homogeneous
+  std::vector<char> is_in_camera_;       // the fit of each point
 };
 
 // Sums over an image's observations, in the directions that other images
@@ -133,6 +140,9 @@ struct ImageSums {
   double square = 0;           // e' R_ii^+ e
   int64_t num_directions = 0;  // in these sums
   Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
+  // GainShare() of the sums in which each observation has the weight that the
+  // noise's Cauchy loss gives it; GainShare() itself where there is none.
+  double robust_gain_share = 0;
 
   // The standard deviations of the centre, scene units, and of the rotation,
   // radians, for noise of one pixel, in the direction where they are largest.
