@@ -106,6 +106,34 @@ TEST(FindLooseParts, KnowsThatTwoTracksHoldNoPartAndThreeDo) {
   }
 }
 
+// One image of the rest sees the part's points as before, however large the
+// part is.
+TEST(FindLooseParts, KnowsThatASingleImageGivesAPartNoScale) {
+  const Model model = TwentyFrames(1);
+  const std::vector<char> is_second = InSecond(model);
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
+  std::vector<char> is_removed(model.track_elements.size(), 0);
+  for (const Point3D& point : model.points3D) {
+    int num_second = 0;
+    bool has_link = false;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      num_second += is_second[image_of[e]];
+      has_link |= image_of[e] == 0;
+    }
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      is_removed[e] = has_link && num_second > 1
+                          ? is_second[image_of[e]] == 0 && image_of[e] != 0
+                          : num_second > 0 && is_second[image_of[e]] == 0;
+    }
+  }
+  const std::vector<ModelPart> parts =
+      PartsOf(RemoveObservations(model, is_removed).model);
+  ASSERT_THAT(parts, SizeIs(1));
+  EXPECT_THAT(parts[0].images, SizeIs(8));
+  EXPECT_GT(parts[0].num_tracks, 20);
+  EXPECT_TRUE(std::isinf(parts[0].center_sigma));
+}
+
 // Rigs of two cameras give both parts their scale.
 TEST(FindLooseParts, CountsOnTheScaleThatRigsGive) {
   const Model with_scale = Cut(TwentyFrames(1, 2), 4);

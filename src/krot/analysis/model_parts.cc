@@ -22,7 +22,8 @@ using Eigen::Vector3d;
 using Matrix37 = Eigen::Matrix<double, 3, 7>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
 
-// Frames that share so many tracks are not told apart.
+// Tracks that several frames of both sides see compare place, turn and scale:
+// so many of them hold any part.
 constexpr int64_t kManyTracks = 50;
 // A part is weak if three of its standard deviations are above a tenth of the
 // cameras' radius.
@@ -30,38 +31,11 @@ constexpr double kWeakSigma = 0.1 / 3;
 // Eigenvalues of a matrix with ones on its diagonal: less holds nothing.
 constexpr double kHoldsNothing = 1e-9;
 
-// The frames, or groups of frames, that see each track; ascending.
-using Sights = std::vector<std::vector<int32_t>>;
-
+// Two frames, and how many tracks both see.
 struct Link {
   int32_t a, b;  // a < b
   int64_t num_tracks;
 };
-
-// All pairs that share tracks, those that share most first.
-std::vector<Link> LinksOf(const Sights& sights, int32_t count) {
-  std::vector<std::vector<int32_t>> tracks_of(count);
-  for (size_t k = 0; k < sights.size(); ++k) {
-    for (const int32_t n : sights[k]) {
-      tracks_of[n].push_back(static_cast<int32_t>(k));
-    }
-  }
-  std::vector<Link> links;
-  std::vector<int64_t> shared(count, 0);
-  for (int32_t a = 0; a < count; ++a) {
-    for (const int32_t k : tracks_of[a]) {
-      for (const int32_t b : sights[k]) ++shared[b];
-    }
-    for (int32_t b = a + 1; b < count; ++b) {
-      if (shared[b] > 0) links.push_back({a, b, shared[b]});
-    }
-    std::fill(shared.begin(), shared.end(), 0);
-  }
-  std::stable_sort(
-      links.begin(), links.end(),
-      [](const Link& x, const Link& y) { return x.num_tracks > y.num_tracks; });
-  return links;
-}
 
 Vector3d MeanOf(const std::vector<Vector3d>& places) {
   Vector3d mean = Vector3d::Zero();
@@ -89,11 +63,11 @@ class PartFinder {
   }
 
   std::vector<ModelPart> Run() {
-    Group();
+    Span();
     std::vector<ModelPart> parts = Separate();
     for (size_t cut = 0; cut < tree_.size(); ++cut) {
       const std::vector<char> is_part = SmallerSide(cut);
-      if (NumFrames(is_part) < 2) continue;
+      if (NumFrames(is_part) < 2 || IsWellTied(is_part, tree_[cut])) continue;
       ModelPart part = PartOf(is_part);
       if (part.relative_center_sigma > kWeakSigma) {
         parts.push_back(std::move(part));
@@ -107,109 +81,85 @@ class PartFinder {
   }
 
  private:
+  // visit(element, frame) for each observation of point k that is tested.
   template <typename Visit>
-  void ForEachTested(const Point3D& point, const Visit& visit) const {
+  void ForEachTested(size_t k, const Visit& visit) const {
+    const Point3D& point = model_.points3D[k];
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
       if (noise_.observations[e].num_controlled == 0) continue;
-      const int32_t frame = geometries_[image_of_[e]].frame;
-      visit(e, frame);
+      visit(e, geometries_[image_of_[e]].frame);
     }
   }
 
-  // Unites frames that share many tracks, and spans a forest of what is left.
-  void Group() {
+  // Finds the tracks of frames, and a maximum spanning forest of the frames.
+  void Span() {
     const auto num_frames = static_cast<int32_t>(model_.frames.size());
-    Sights sights;
-    for (const Point3D& point : model_.points3D) {
-      std::vector<int32_t>& frames = sights.emplace_back();
-      ForEachTested(point,
-                    [&](uint64_t, int32_t frame) { frames.push_back(frame); });
-      SortUnique(&frames);
+    tracks_of_.resize(num_frames);
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      ForEachTested(k, [&](uint64_t, int32_t frame) {
+        std::vector<size_t>& tracks = tracks_of_[frame];
+        if (tracks.empty() || tracks.back() != k) tracks.push_back(k);
+      });
     }
-    DisjointSets sets(num_frames);
-    for (const Link& link : LinksOf(sights, num_frames)) {
-      if (link.num_tracks < kManyTracks) break;
-      sets.Unite(link.a, link.b);
-    }
-    // Frames without tracks are in no group.
-    std::vector<int32_t> group_of_root(num_frames, -1);
-    group_of_.assign(num_frames, -1);
-    for (const std::vector<int32_t>& frames : sights) {
-      for (const int32_t f : frames) {
-        int32_t& group = group_of_root[sets.Find(f)];
-        if (group < 0) group = num_groups_++;
-        group_of_[f] = group;
+    std::vector<Link> links;
+    std::vector<int64_t> shared(num_frames);
+    for (int32_t a = 0; a < num_frames; ++a) {
+      std::fill(shared.begin(), shared.end(), 0);
+      for (const size_t k : tracks_of_[a]) {
+        ForEachTested(k, [&](uint64_t, int32_t b) { ++shared[b]; });
+      }
+      for (int32_t b = a + 1; b < num_frames; ++b) {
+        if (shared[b] > 0) links.push_back({a, b, shared[b]});
       }
     }
-    for (std::vector<int32_t>& seen : sights) {
-      for (int32_t& n : seen) n = group_of_[n];
-      SortUnique(&seen);
-      if (seen.size() < 2) seen.clear();
-    }
-    DisjointSets joined(num_groups_);
-    for (const Link& link : LinksOf(sights, num_groups_)) {
+    std::stable_sort(links.begin(), links.end(),
+                     [](const Link& x, const Link& y) {
+                       return x.num_tracks > y.num_tracks;
+                     });
+    DisjointSets joined(num_frames);
+    for (const Link& link : links) {
       if (joined.Find(link.a) == joined.Find(link.b)) continue;
       joined.Unite(link.a, link.b);
       tree_.push_back(link);
     }
-    for (int32_t g = 0; g < num_groups_; ++g) {
-      component_of_.push_back(static_cast<int32_t>(joined.Find(g)));
+    for (int32_t f = 0; f < num_frames; ++f) {
+      component_of_.push_back(
+          tracks_of_[f].empty() ? -1 : static_cast<int32_t>(joined.Find(f)));
     }
-    for (size_t k = 0; k < sights.size(); ++k) {
-      if (!sights[k].empty()) AddSights(k);
-    }
-  }
-
-  // What each group's observations of a track say about its point.
-  struct Sight {
-    int32_t group = 0;
-    Matrix3d H = Matrix3d::Zero();
-  };
-  struct SharedTrack {
-    Vector3d x;
-    std::vector<Sight> sights;
-  };
-
-  void AddSights(size_t k) {
-    SharedTrack track{noise_.points[k], {}};
-    ForEachTested(model_.points3D[k], [&](uint64_t e, int32_t frame) {
-      const int32_t n = image_of_[e];
-      const Point2D& pixel =
-          model_.images[n].points2D[model_.track_elements[e].point2D_idx];
-      const RigidTransform& pose = geometries_[n].cam_from_world;
-      const Vector3d x_cam = pose * track.x;
-      const auto E = RowAtProjection(model_.cameras[geometries_[n].camera],
-                                     {pixel.x, pixel.y}, x_cam);
-      if (!E) return;
-      const Eigen::Matrix<double, 2, 3> J =
-          (E->bottomRows<2>() -
-           E->bottomRows<2>() * x_cam / E->row(0).dot(x_cam) * E->row(0)) /
-          E->row(0).dot(x_cam) * pose.rotation;
-      if (!J.allFinite()) return;
-      const int32_t group = group_of_[frame];
-      auto sight =
-          std::find_if(track.sights.begin(), track.sights.end(),
-                       [&](const Sight& one) { return one.group == group; });
-      if (sight == track.sights.end()) {
-        sight = track.sights.insert(sight, Sight{group, Matrix3d::Zero()});
-      }
-      sight->H += J.transpose() * J;
-    });
-    if (track.sights.size() > 1) shared_.push_back(std::move(track));
   }
 
   int64_t NumFrames(const std::vector<char>& is_part) const {
-    return std::count_if(group_of_.begin(), group_of_.end(),
-                         [&](int32_t g) { return g >= 0 && is_part[g] != 0; });
+    return std::count(is_part.begin(), is_part.end(), 1);
+  }
+
+  // Whether so many tracks compare the sides that they hold both; looks at
+  // those of the two frames that share most.
+  bool IsWellTied(const std::vector<char>& is_part, const Link& link) const {
+    int64_t count = 0;
+    for (const size_t k : tracks_of_[link.a]) {
+      int32_t first[2] = {-1, -1};
+      bool is_located[2] = {false, false};
+      ForEachTested(k, [&](uint64_t, int32_t frame) {
+        const int side = is_part[frame];
+        is_located[side] |= first[side] >= 0 && first[side] != frame;
+        first[side] = frame;
+      });
+      count += is_located[0] && is_located[1];
+      if (count >= kManyTracks) return true;
+    }
+    return false;
   }
 
   // The components, but for the one with the most frames: nothing holds them.
   std::vector<ModelPart> Separate() const {
     std::vector<std::pair<int64_t, std::vector<char>>> all;
-    for (int32_t c = 0; c < num_groups_; ++c) {
-      if (component_of_[c] != c) continue;
+    for (size_t f = 0; f < component_of_.size(); ++f) {
+      const auto root = static_cast<int32_t>(f);
+      if (component_of_[f] != root) continue;
       std::vector<char> is_part;
-      for (const int32_t other : component_of_) is_part.push_back(other == c);
+      for (const int32_t other : component_of_) {
+        is_part.push_back(other == root ? 1 : 0);
+      }
       const int64_t count = NumFrames(is_part);
       all.emplace_back(count, std::move(is_part));
     }
@@ -223,16 +173,17 @@ class PartFinder {
     return parts;
   }
 
-  // The groups on the side of a link with fewer frames.
+  // The frames on the side of a link with fewer of them.
   std::vector<char> SmallerSide(size_t cut) const {
-    DisjointSets sets(num_groups_);
+    DisjointSets sets(static_cast<int64_t>(component_of_.size()));
     for (size_t n = 0; n < tree_.size(); ++n) {
       if (n != cut) sets.Unite(tree_[n].a, tree_[n].b);
     }
     const auto side = [&](int32_t of) {
       std::vector<char> is_part;
-      for (int32_t g = 0; g < num_groups_; ++g) {
-        is_part.push_back(sets.Find(g) == sets.Find(of));
+      const int64_t root = sets.Find(of);
+      for (size_t f = 0; f < component_of_.size(); ++f) {
+        is_part.push_back(sets.Find(static_cast<int64_t>(f)) == root ? 1 : 0);
       }
       return is_part;
     };
@@ -240,16 +191,17 @@ class PartFinder {
     return NumFrames(b) <= NumFrames(a) ? b : a;
   }
 
-  bool IsIn(const std::vector<char>& is_part, size_t n) const {
-    const ImageGeometry& geometry = geometries_[n];
-    return geometry.has_pose && group_of_[geometry.frame] >= 0 &&
-           is_part[group_of_[geometry.frame]] != 0;
+  bool HasTracks(const ImageGeometry& geometry) const {
+    return geometry.has_pose && component_of_[geometry.frame] >= 0;
   }
 
   std::vector<int32_t> ImagesOf(const std::vector<char>& is_part) const {
     std::vector<int32_t> images;
     for (size_t n = 0; n < geometries_.size(); ++n) {
-      if (IsIn(is_part, n)) images.push_back(static_cast<int32_t>(n));
+      const ImageGeometry& geometry = geometries_[n];
+      if (HasTracks(geometry) && is_part[geometry.frame] != 0) {
+        images.push_back(static_cast<int32_t>(n));
+      }
     }
     return images;
   }
@@ -257,12 +209,30 @@ class PartFinder {
   // Whether rigs give both sides a scale.
   bool HasScales(const std::vector<char>& is_part) const {
     bool has[2] = {false, false};
-    for (size_t n = 0; n < geometries_.size(); ++n) {
-      const ImageGeometry& geometry = geometries_[n];
-      if (!geometry.has_pose || group_of_[geometry.frame] < 0) continue;
-      has[IsIn(is_part, n)] |= !geometry.cam_from_rig.translation.isZero(0);
+    for (const ImageGeometry& geometry : geometries_) {
+      if (!HasTracks(geometry)) continue;
+      has[static_cast<int>(is_part[geometry.frame])] |=
+          !geometry.cam_from_rig.translation.isZero(0);
     }
     return has[0] && has[1];
+  }
+
+  // J'J, with J the derivatives of the pixel by its point.
+  Matrix3d InformationOf(uint64_t e, size_t k) const {
+    const int32_t n = image_of_[e];
+    const Point2D& pixel =
+        model_.images[n].points2D[model_.track_elements[e].point2D_idx];
+    const RigidTransform& pose = geometries_[n].cam_from_world;
+    const Vector3d x_cam = pose * noise_.points[k];
+    const auto E = RowAtProjection(model_.cameras[geometries_[n].camera],
+                                   {pixel.x, pixel.y}, x_cam);
+    if (!E) return Matrix3d::Zero();
+    const double depth = E->row(0).dot(x_cam);
+    const Eigen::Matrix<double, 2, 3> J =
+        (E->bottomRows<2>() - E->bottomRows<2>() * x_cam / depth * E->row(0)) /
+        depth * pose.rotation;
+    if (!J.allFinite()) return Matrix3d::Zero();
+    return J.transpose() * J;
   }
 
   ModelPart PartOf(const std::vector<char>& is_part) const {
@@ -281,16 +251,20 @@ class PartFinder {
       return K;
     };
     Matrix7 M = Matrix7::Zero(), D = Matrix7::Zero();
-    for (const SharedTrack& track : shared_) {
-      Matrix3d H_a = Matrix3d::Zero(), H_b = Matrix3d::Zero();
-      for (const Sight& sight : track.sights) {
-        (is_part[sight.group] != 0 ? H_a : H_b) += sight.H;
-      }
-      if (H_a.isZero(0) || H_b.isZero(0)) continue;
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      bool has[2] = {false, false};
+      ForEachTested(k, [&](uint64_t, int32_t frame) {
+        has[static_cast<int>(is_part[frame])] = true;
+      });
+      if (!has[0] || !has[1]) continue;
       ++part.num_tracks;
-      const Matrix3d root = RootOfInverse(H_a + H_b);
-      const Matrix37 K = motion(track.x);
-      M += K.transpose() * H_a * root * root.transpose() * H_b * K;
+      Matrix3d H[2] = {Matrix3d::Zero(), Matrix3d::Zero()};
+      ForEachTested(k, [&](uint64_t e, int32_t frame) {
+        H[static_cast<int>(is_part[frame])] += InformationOf(e, k);
+      });
+      const Matrix3d root = RootOfInverse(H[0] + H[1]);
+      const Matrix37 K = motion(noise_.points[k]);
+      M += K.transpose() * H[0] * root * root.transpose() * H[1] * K;
     }
     for (const Vector3d& center : centers) {
       const Matrix37 K = motion(center);
@@ -327,13 +301,11 @@ class PartFinder {
   const Model& model_;
   const ModelNoise& noise_;
   const std::vector<ImageGeometry> geometries_;
-  const std::vector<int32_t> image_of_;  // by track element
-  double radius_ = 0;                    // of the cameras, scene units
-  std::vector<int32_t> group_of_;        // by frame; -1: without tracks
-  int32_t num_groups_ = 0;
-  std::vector<int32_t> component_of_;  // by group
-  std::vector<Link> tree_;             // between groups
-  std::vector<SharedTrack> shared_;    // that several groups see
+  const std::vector<int32_t> image_of_;         // by track element
+  double radius_ = 0;                           // of the cameras, scene units
+  std::vector<std::vector<size_t>> tracks_of_;  // by frame
+  std::vector<Link> tree_;
+  std::vector<int32_t> component_of_;  // by frame; -1: without tracks
 };
 
 }  // namespace

@@ -23,9 +23,10 @@ LastingFaults FindLastingFaults(const Model& model);
 
 // The parts of a model that too few tracks tie to the rest, the most images
 // first. Tracks are those that `noise` tests, as it fits them; sigma_px must be
-// known. Frames that share many tracks are taken together; a maximum spanning
-// tree then joins these groups by the tracks that they share. Where cutting it
-// gives a part of two frames or more, ModelPart::center_sigma is found for it.
+// known. A maximum spanning tree joins frames by the tracks that they share.
+// Where cutting it gives a part of two frames or more that is not tied by many
+// tracks which several frames of both sides see, ModelPart::center_sigma is
+// found for it.
 //
 // To first order: a part moves as a whole, with its points, by a similarity
 // about its centre o, so by K (t, omega, s) at x with K = (I, -[x - o]x, x -
@@ -36,7 +37,7 @@ LastingFaults FindLastingFaults(const Model& model);
 //
 // is what it says about the part, and sigma^2 times the inverse of their sum is
 // the covariance. Requires a valid model. O(sum of squared track lengths), and
-// for each cut O(tracks between groups).
+// O(observations) for each part that is not tied by many tracks.
 std::vector<ModelPart> FindLooseParts(const Model& model,
                                       const ModelNoise& noise);
 

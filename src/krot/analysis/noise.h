@@ -140,10 +140,6 @@ struct ImageSums {
   double square = 0;           // e' R_ii^+ e
   int64_t num_directions = 0;  // in these sums
   Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
-  // GainShare() of the sums in which each observation has the weight that the
-  // noise's Cauchy loss gives it; GainShare() itself where there is none.
-  double robust_gain_share = 0;
-
   // The standard deviations of the centre, scene units, and of the rotation,
   // radians, for noise of one pixel, in the direction where they are largest.
   // Infinite where nothing holds them.
@@ -168,24 +164,41 @@ struct ImageSums {
   }
 };
 
-// The limit to which a model with these errors was filtered: their 99.9 %
-// quantile; 0 without errors.
-double FilterLimit(std::vector<double> errors_px);
-
 // An image's squared errors up to a limit, as shares u of the limit's square.
 // Gaussian noise of sigma gives u the density lambda exp(-lambda u) / (1 -
 // exp(-lambda)) with lambda = limit^2 / (2 sigma^2), whatever was filtered out
 // beyond the limit. Errors by chance fill the disc evenly: lambda = 0.
-struct ErrorsInDisc {
-  ErrorsInDisc(const std::vector<double>& errors_px, double limit_px);
+//
+// In a track of two only the error across the epipolar line shows, and half of
+// its variance: the density is that of exp(-2 lambda u) / sqrt(u), and errors
+// by chance fill a segment evenly.
+class ErrorsInDisc {
+ public:
+  // Of observations in longer tracks and in tracks of two; pixels.
+  ErrorsInDisc(const std::vector<double>& errors_px,
+               const std::vector<double>& errors_of_two_px, double limit_px);
 
-  int64_t num = 0;
-  double mean = 0;    // of u, at most that of an even disc
-  double lambda = 0;  // the likeliest one, >= 0
+  int64_t num() const { return num_in_disc_ + num_on_segment_; }
+  // Of u, and of 2 u in tracks of two; at most that of chance.
+  double mean() const { return mean_; }
+  double lambda() const { return lambda_; }  // the likeliest one, >= 0
   // The exponent of Chernoff's bound on the probability of such a mean, or of
-  // one farther from that of `other`: num KL(lambda, other) >= 0.
+  // one farther from that of `other`: the divergence of all u, >= 0.
   double Exponent(double other) const;
+
+ private:
+  // If lambda is this.
+  double MeanAt(double lambda) const;
+  double LogFactors(double lambda) const;
+
+  int64_t num_in_disc_ = 0, num_on_segment_ = 0;
+  double mean_ = 0, lambda_ = 0;
 };
+
+// The errors of each image up to the limit to which the model was filtered:
+// their 99.9 % quantile. `errors_px` as PixelErrors gives them.
+std::vector<ErrorsInDisc> FillDiscs(const Model& model,
+                                    const std::vector<double>& errors_px);
 
 // The exponent of Chernoff's bound exp(-exponent) on the probability that so
 // many trials or more succeed, each with probability p; 0 if as many are to be

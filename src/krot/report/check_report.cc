@@ -302,8 +302,8 @@ std::string ForAdjusted(const CheckReport& report) {
                        : "") +
          (check.parts.empty()
               ? "."
-              : "; but too little ties " + Counted(check.parts.size(), "part") +
-                    " to the rest.");
+              : "; but " + Counted(check.parts.size(), "part") +
+                    (check.parts.size() > 1 ? " are" : " is") + " loose.");
 }
 
 }  // namespace

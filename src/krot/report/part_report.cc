@@ -49,14 +49,15 @@ std::string PartsSentence(const ModelCheck& check) {
         return a->relative_center_sigma < b->relative_center_sigma;
       });
   const bool is_held = std::isfinite(weakest.relative_center_sigma);
-  return text + (text.empty() ? "Only " : " Only ") +
+  return text + (text.empty() ? "" : " ") +
          Counted(weakest.num_tracks, "track") +
          (weakest.num_tracks == 1 ? " ties " : " tie ") + words(weakest) +
-         " to the rest: " +
-         (is_held ? "noise alone may have moved them, all together, by " +
+         " to the rest " +
+         (is_held ? "so weakly that noise alone may have moved them, all "
+                    "together, by " +
                         FormatNumber(100 * weakest.relative_center_sigma, 0) +
                         " % of the cameras' radius (standard deviation)"
-                  : "their common place, turn or scale is arbitrary") +
+                  : "and leave their common place, turn or scale open") +
          (weak.size() > 1 ? "; " + Counted(weak.size() - 1, "other part") +
                                 (weak.size() > 2 ? " are" : " is") + " as loose"
                           : "") +
@@ -77,7 +78,7 @@ std::string PartTable(const ModelCheck& check, size_t max_rows) {
              ? FormatNumber(100 * part.relative_center_sigma, 1)
              : "-"});
   }
-  return "\nParts that too few tracks tie to the rest: " +
+  return "\nParts that tracks do not tie to the rest firmly: " +
          Thousands(check.parts.size()) + "\n" + table.ToString();
 }
 
