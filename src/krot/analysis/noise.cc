@@ -263,16 +263,22 @@ double StandardizedError(double chi2, int num_directions) {
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
                          const Context& context) {
   CheckOptions(model, options);
-  Snooper snooper(model, options, context);
-  const auto num_tested = snooper.noise().num_tested;
-  NoiseSnooping result = snooper.Snoop();
+  Snooper by_median(model, options, context);
+  const int64_t half = by_median.noise().num_tested / 2;
+  const auto is_most_left = [&](const NoiseSnooping& one) {
+    return static_cast<int64_t>(one.removed.size()) <= half;
+  };
+  NoiseSnooping result = by_median.Snoop();
+  if (is_most_left(result)) return result;
   // Then sigma has followed the removals down, as the median does where errors
-  // have no common size. A higher quantile hardly moves with what goes, and
-  // finds nothing more in what is left.
-  if (2 * static_cast<int64_t>(result.removed.size()) > num_tested) {
-    result = Snooper(model, options, context, kUpperQuartile).Snoop();
-    result.has_common_noise = false;
-  }
+  // have no common size. A higher quantile follows less, and finds nothing more
+  // in what is left. If it does, too, sigma stays as it was at first.
+  Snooper snooper(model, options, context, kUpperQuartile);
+  NoiseOptions held = options;
+  held.sigma_px = snooper.noise().sigma_px;
+  result = snooper.Snoop();
+  if (!is_most_left(result)) result = Snooper(model, held, context).Snoop();
+  result.has_common_noise = false;
   return result;
 }
 

@@ -36,7 +36,8 @@ struct NoiseSnooping {
   std::vector<double> sigma_path_px;
   // False if sigma, by the median, fell until more than half of the
   // observations were gone. Then it is such that three quarters of the w^2 are
-  // below their quantile of chi^2.
+  // below their quantile of chi^2, after each removal or, if more than half
+  // would go again, at first.
   bool has_common_noise = true;
 };
 
