@@ -176,6 +176,20 @@ struct TwoPointTrack {
   Eigen::Vector3d second = Eigen::Vector3d::Zero();
 };
 
+// Images that too few tracks tie to the rest of the model: as a whole, they may
+// be elsewhere, turned, larger or smaller, and no error would show it.
+struct ModelPart {
+  std::vector<int32_t> images;  // in ModelCheck::images, ascending
+  // Tracks that images of both sides see, wrong observations not counted.
+  int64_t num_tracks = 0;
+  // By how much noise lets the cameras be off (RMS of their standard
+  // deviations) if the part moves, turns and grows as a whole, scene units, and
+  // relative to the radius of all cameras (RMS). At least a thirtieth of it;
+  // infinite where nothing holds the part. To first order.
+  double center_sigma = 0;
+  double relative_center_sigma = 0;
+};
+
 struct ModelCheckOptions {
   // Must be read for this model (ReadDatabase). None: the model alone is
   // judged. If it has keypoint scales, the noise of an observation is taken to
@@ -208,6 +222,7 @@ struct ModelCheck {
   // Wrong observations of images that are not wrong; largest w first.
   std::vector<WrongObservation> observations;
   std::vector<TwoPointTrack> tracks;
+  std::vector<ModelPart> parts;  // the most images first
   // Positions of the points without wrong observations, as Model::points3D.
   std::vector<Eigen::Vector3d> points;
 

@@ -256,42 +256,53 @@ TEST(CheckModel, DoesNotCallANoisyImageChanceThatOthersTookItsTracksFrom) {
 TEST(ErrorsInDisc, HasTheLikeliestDensityAndItsDivergence) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> uniform(0, 1);
-  for (const double lambda : {0.0, 0.5, 3.0, 40.0}) {
-    std::vector<double> errors;  // of a disc of 4 pixels, and some beyond
-    for (int n = 0; n < 500; ++n) {
-      const double u =
-          lambda == 0
-              ? uniform(random)
-              : -std::log1p(uniform(random) * std::expm1(-lambda)) / lambda;
-      errors.push_back(4 * std::sqrt(u));
-      if (n % 100 == 0) errors.push_back(5 + n);
-    }
-    const ErrorsInDisc disc(errors, 4);
-    EXPECT_EQ(disc.num, 500);
-    constexpr int kCells = 100000;
-    const auto sum = [&](double l, const auto& value) {
-      double all = 0;
-      double total = 0;
-      for (int n = 0; n < kCells; ++n) {
-        const double u = (n + 0.5) / kCells;
-        all += std::exp(-l * u);
-        total += std::exp(-l * u) * value(u);
+  std::normal_distribution<double> normal;
+  for (const bool is_of_two : {false, true}) {
+    for (const double lambda : {0.0, 0.5, 3.0, 40.0}) {
+      std::vector<double> errors;  // up to 4 pixels, and some beyond
+      while (errors.size() < 505) {
+        const double sigma = 4 / std::sqrt(2 * lambda * (is_of_two ? 2 : 1));
+        double error = is_of_two
+                           ? sigma * std::abs(normal(random))
+                           : sigma * std::hypot(normal(random), normal(random));
+        if (lambda == 0) {
+          error = 4 * std::pow(uniform(random), is_of_two ? 1 : 0.5);
+        }
+        if (error <= 4) errors.push_back(error);
+        if (errors.size() % 101 == 100) errors.push_back(5);
       }
-      return std::make_pair(total / all, std::log(all / kCells));
-    };
-    const auto identity = [](double u) { return u; };
-    const double mean = sum(disc.lambda, identity).first;
-    if (disc.lambda > 0) {
-      EXPECT_NEAR(mean, disc.mean, 1e-6);
-    }
-    EXPECT_NEAR(disc.lambda, lambda, 0.1 * lambda + 0.5);
-    for (const double other : {0.0, 1.0, 10.0}) {
-      const double divergence =
-          sum(disc.lambda, [&](double u) { return (other - disc.lambda) * u; })
-              .first +
-          sum(other, identity).second - sum(disc.lambda, identity).second;
-      EXPECT_NEAR(disc.Exponent(other), 500 * divergence,
-                  1e-3 * (1 + disc.Exponent(other)));
+      const ErrorsInDisc disc =
+          is_of_two ? ErrorsInDisc({}, errors, 4) : ErrorsInDisc(errors, {}, 4);
+      EXPECT_EQ(disc.num(), 500);
+      constexpr int kCells = 100000;
+      // Over the radius, with u its square.
+      const auto sum = [&](double l, const auto& value) {
+        double all = 0, total = 0, even = 0;
+        for (int n = 0; n < kCells; ++n) {
+          const double r = (n + 0.5) / kCells;
+          const double u = r * r * (is_of_two ? 2 : 1);
+          const double size = is_of_two ? 1 : r;
+          even += size;
+          all += size * std::exp(-l * u);
+          total += size * std::exp(-l * u) * value(u);
+        }
+        return std::make_pair(total / all, std::log(all / even));
+      };
+      const auto identity = [](double u) { return u; };
+      const double mean = sum(disc.lambda(), identity).first;
+      if (disc.lambda() > 0) {
+        EXPECT_NEAR(mean, disc.mean(), 1e-6);
+      }
+      EXPECT_NEAR(disc.lambda(), lambda, 0.15 * lambda + 0.5);
+      for (const double other : {0.0, 1.0, 10.0}) {
+        const double divergence =
+            sum(disc.lambda(),
+                [&](double u) { return (other - disc.lambda()) * u; })
+                .first +
+            sum(other, identity).second - sum(disc.lambda(), identity).second;
+        EXPECT_NEAR(disc.Exponent(other), 500 * divergence,
+                    1e-3 * (1 + disc.Exponent(other)));
+      }
     }
   }
 }

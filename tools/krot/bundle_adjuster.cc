@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/analysis/model_parts.h"
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"
 #include "krot/model/model_io.h"
@@ -133,6 +134,7 @@ int Run(const ModelPaths& paths, const std::string& check_points_path,
   report.check_points = survey.CompareCheckPoints(result.model, check_points);
   report.position_frame = survey.frame();
   report.is_in_position_frame = survey.is_in_own_frame();
+  report.faults = FindLastingFaults(result.model);
   report.distances = distances.Compare(result.model, report.summary);
 
   WriteOutput(result.model, paths, write_options, common.log, &report.run);

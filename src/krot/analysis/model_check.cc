@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "krot/analysis/model_parts.h"
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
@@ -27,7 +28,8 @@ class Checker {
       : model_(model),
         options_(options),
         context_(context),
-        image_of_(ImagesOfElements(model)) {
+        image_of_(ImagesOfElements(model)),
+        in_disc_(FillDiscs(model, PixelErrors(model, context.num_threads))) {
     noise_options_.false_alarm = options.false_alarm;
     noise_options_.is_left_out.assign(image_of_.size(), 0);
     const auto odd = FindOddFocalLengths(model);
@@ -39,18 +41,6 @@ class Checker {
       image.others_focal_length_px = odd[n] ? odd[n]->others : 0;
     }
     for (const int32_t n : image_of_) ++check_.images[n].num_observations;
-    const std::vector<double> errors = PixelErrors(model, context.num_threads);
-    std::vector<std::vector<double>> of_image(model.images.size());
-    std::vector<double> all;
-    for (size_t e = 0; e < errors.size(); ++e) {
-      if (!std::isfinite(errors[e])) continue;
-      of_image[image_of_[e]].push_back(errors[e]);
-      all.push_back(errors[e]);
-    }
-    const double limit = FilterLimit(std::move(all));
-    for (const std::vector<double>& own : of_image) {
-      in_disc_.emplace_back(own, limit);
-    }
   }
 
   ModelCheck Run() {
@@ -61,6 +51,10 @@ class Checker {
     do {
       snooping_ = SnoopNoise(model_, noise_options_, context_);
       if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
+      // Images that go must not change what is taken for noise.
+      if (!snooping_.has_common_noise) {
+        noise_options_.sigma_px = snooping_.noise.sigma_px;
+      }
       Count();
       sums_ = AddUpImages(model_, snooping_.noise);
     } while (CallWrong(WorstImage()) || CallUnsupported());
@@ -252,7 +246,7 @@ class Checker {
   double LeastLambda() const {
     const auto log_lambda = [&](size_t n) {
       return std::log(
-          std::max(in_disc_[n].lambda, std::numeric_limits<double>::min()));
+          std::max(in_disc_[n].lambda(), std::numeric_limits<double>::min()));
     };
     const double median = MedianOfSound(log_lambda);
     // In median deviations: three standard deviations of Gaussian values.
@@ -265,7 +259,7 @@ class Checker {
   // as those of chance matches.
   bool IsChance(size_t n, double least_lambda) const {
     const ErrorsInDisc& errors = in_disc_[n];
-    return errors.num > 0 && errors.lambda < least_lambda &&
+    return errors.num() > 0 && errors.lambda() < least_lambda &&
            errors.Exponent(least_lambda) > LeastExponent(n) &&
            errors.Exponent(0) < -std::log(options_.false_alarm);
   }
@@ -314,6 +308,7 @@ class Checker {
                                      one.w, one.error_px, one.is_of_two});
     }
     check_.points = snooping_.noise.points;
+    check_.parts = FindLooseParts(model_, snooping_.noise);
   }
 
   // Snoops what was removed of each track by itself: does it agree on a point?
@@ -369,7 +364,8 @@ class Checker {
   const ModelCheckOptions& options_;
   const Context& context_;
   const std::vector<int32_t> image_of_;  // by track element
-  std::vector<ErrorsInDisc> in_disc_;    // by image, in the model as it stands
+  // By image, in the model as it stands.
+  const std::vector<ErrorsInDisc> in_disc_;
   NoiseOptions noise_options_;
   NoiseSnooping snooping_;
   std::vector<ImageSums> sums_;  // as Model::images

@@ -15,8 +15,15 @@
 namespace krot::internal {
 namespace {
 
-// The medians of chi^2 with one and two degrees of freedom.
-constexpr double kMedians[] = {0, 0.4549364231195724, 1.3862943611198906};
+// A quantile of chi^2 with one and two degrees of freedom.
+struct Chi2Quantile {
+  double probability;
+  double of_chi2[3];  // by degrees of freedom
+};
+constexpr Chi2Quantile kMedian = {0.5,
+                                  {0, 0.4549364231195724, 1.3862943611198906}};
+constexpr Chi2Quantile kUpperQuartile = {
+    0.75, {0, 1.3233036969314664, 2.772588722239781}};
 
 void CheckOptions(const Model& model, const NoiseOptions& options) {
   CheckArgument(options.false_alarm > 0 && options.false_alarm < 1,
@@ -64,7 +71,7 @@ std::optional<double> TailScale(double ratio) {
     const double middle = (low + high) / 2;
     (ratio_of(middle) < ratio ? low : high) = middle;
   }
-  return std::sqrt(kMedians[2] / std::expm1(high));
+  return std::sqrt(kMedian.of_chi2[2] / std::expm1(high));
 }
 
 // Keypoints are stored in single precision: no model has less noise than that.
@@ -78,13 +85,13 @@ double SmallestSigma(const Model& model) {
 
 class Snooper {
  public:
-  // Measures sigma if none is given, here or in the options.
+  // Measures sigma by this quantile if the options give none.
   Snooper(const Model& model, const NoiseOptions& options,
-          const Context& context, std::optional<double> sigma_px = {})
+          const Context& context, const Chi2Quantile& quantile = kMedian)
       : model_(model),
         options_(options),
         context_(context),
-        given_sigma_(sigma_px ? sigma_px : options.sigma_px),
+        quantile_(quantile),
         tracks_(model, options.relative_sigmas) {
     for (size_t e = 0; e < options.is_left_out.size(); ++e) {
       if (options.is_left_out[e]) tracks_.Remove(e);
@@ -117,7 +124,7 @@ class Snooper {
   const Model& model_;
   const NoiseOptions& options_;
   const Context& context_;
-  const std::optional<double> given_sigma_;
+  const Chi2Quantile& quantile_;
   TrackNoise tracks_;
   ModelNoise noise_;
 };
@@ -133,20 +140,22 @@ void Snooper::Measure() {
   for (uint64_t e = 0; e < model_.track_elements.size(); ++e) {
     if (!IsTested(e)) continue;
     variances.push_back(tracks_.SquaredError(e) /
-                        kMedians[Of(e).num_controlled]);
+                        quantile_.of_chi2[Of(e).num_controlled]);
     redundancy += Of(e).redundancy[0] + Of(e).redundancy[1];
   }
   noise_ = {};
   noise_.num_tested = static_cast<int64_t>(variances.size());
   if (variances.empty()) return;
-  noise_.sigma_px = given_sigma_.value_or(
-      std::max(std::sqrt(Quantile(0.5, &variances)), SmallestSigma(model_)));
-  // The median of n exponential variables has the variance of a mean of n
-  // log(2)^2.
-  noise_.degrees_of_freedom = std::pow(std::log(2.0), 2) * redundancy;
+  const double p = quantile_.probability;
+  noise_.sigma_px = options_.sigma_px.value_or(
+      std::max(std::sqrt(Quantile(p, &variances)), SmallestSigma(model_)));
+  // The quantile of n exponential variables has the variance of a mean of n
+  // log(1 - p)^2 (1 - p) / p.
+  noise_.degrees_of_freedom =
+      std::pow(std::log(1 - p), 2) * (1 - p) / p * redundancy;
   noise_.critical_w =
       CriticalW(noise_.num_tested, options_.false_alarm,
-                given_sigma_ ? kInfinity : noise_.degrees_of_freedom);
+                options_.sigma_px ? kInfinity : noise_.degrees_of_freedom);
   for (uint64_t e = 0; e < model_.track_elements.size(); ++e) {
     if (IsTested(e)) tracks_.SetW(e, StandardizedErrorOf(e));
     noise_.num_above += Of(e).w > noise_.critical_w;
@@ -254,15 +263,22 @@ double StandardizedError(double chi2, int num_directions) {
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
                          const Context& context) {
   CheckOptions(model, options);
-  Snooper snooper(model, options, context);
-  const auto num_tested = snooper.noise().num_tested;
-  const auto sigma = snooper.noise().sigma_px;
-  NoiseSnooping result = snooper.Snoop();
-  // Then sigma has followed the removals down, and the first one is kept
-  // instead.
-  if (2 * static_cast<int64_t>(result.removed.size()) > num_tested) {
-    result = Snooper(model, options, context, sigma).Snoop();
-  }
+  Snooper by_median(model, options, context);
+  const int64_t half = by_median.noise().num_tested / 2;
+  const auto is_most_left = [&](const NoiseSnooping& one) {
+    return static_cast<int64_t>(one.removed.size()) <= half;
+  };
+  NoiseSnooping result = by_median.Snoop();
+  if (is_most_left(result)) return result;
+  // Then sigma has followed the removals down, as the median does where errors
+  // have no common size. A higher quantile follows less, and finds nothing more
+  // in what is left. If it does, too, sigma stays as it was at first.
+  Snooper snooper(model, options, context, kUpperQuartile);
+  NoiseOptions held = options;
+  held.sigma_px = snooper.noise().sigma_px;
+  result = snooper.Snoop();
+  if (!is_most_left(result)) result = Snooper(model, held, context).Snoop();
+  result.has_common_noise = false;
   return result;
 }
 

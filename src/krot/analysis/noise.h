@@ -8,6 +8,7 @@
 
 #include "krot/check.h"
 #include "krot/model.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 
@@ -31,10 +32,13 @@ struct SnoopedObservation {
 struct NoiseSnooping {
   ModelNoise noise;                         // of what is left
   std::vector<SnoopedObservation> removed;  // largest w first
-  // Before each removal, and at last. It is kept as it was at first if it fell,
-  // when measured anew, until more than half of the observations were gone.
-  // This happens where observations have no common noise.
+  // Before each removal, and at last.
   std::vector<double> sigma_path_px;
+  // False if sigma, by the median, fell until more than half of the
+  // observations were gone. Then it is such that three quarters of the w^2 are
+  // below their quantile of chi^2, after each removal or, if more than half
+  // would go again, at first.
+  bool has_common_noise = true;
 };
 
 // Relative to the largest eigenvalue of a sum of squares: less is rounding.
@@ -64,6 +68,9 @@ double CriticalW(int64_t num_tested, double false_alarm,
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
                          const Context& context);
 
+// A point nearer than this lies in its camera; scene units.
+double LeastDistance(const std::vector<ImageGeometry>& geometries);
+
 // All tracks of a model, each fitted by itself with the cameras as they stand,
 // and which of their observations take part.
 class TrackNoise {
@@ -92,8 +99,8 @@ class TrackNoise {
   // The error of any observation, pixels, at its point's present place; not
   // finite if it does not see that.
   Eigen::Vector2d ErrorOf(uint64_t e) const;
-  // The fitted place of point k; the model's place if that is at infinity, or
-  // if the point was not fitted.
+  // The fitted place of point k; the model's place if that is at infinity or in
+  // a camera that sees it, or if the point was not fitted.
   Eigen::Vector3d Point(int64_t k) const;
 
  private:
@@ -120,6 +127,7 @@ class TrackNoise {
   std::vector<ObservationNoise> observations_;
   std::vector<double> squared_errors_;
   std::vector<Eigen::Vector4d> points_;  // homogeneous
+  std::vector<char> is_in_camera_;       // the fit of each point
 };
 
 // Sums over an image's observations, in the directions that other images
@@ -133,7 +141,6 @@ struct ImageSums {
   double square = 0;           // e' R_ii^+ e
   int64_t num_directions = 0;  // in these sums
   Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
-
   // The standard deviations of the centre, scene units, and of the rotation,
   // radians, for noise of one pixel, in the direction where they are largest.
   // Infinite where nothing holds them.
@@ -158,24 +165,41 @@ struct ImageSums {
   }
 };
 
-// The limit to which a model with these errors was filtered: their 99.9 %
-// quantile; 0 without errors.
-double FilterLimit(std::vector<double> errors_px);
-
 // An image's squared errors up to a limit, as shares u of the limit's square.
 // Gaussian noise of sigma gives u the density lambda exp(-lambda u) / (1 -
 // exp(-lambda)) with lambda = limit^2 / (2 sigma^2), whatever was filtered out
 // beyond the limit. Errors by chance fill the disc evenly: lambda = 0.
-struct ErrorsInDisc {
-  ErrorsInDisc(const std::vector<double>& errors_px, double limit_px);
+//
+// In a track of two only the error across the epipolar line shows, and half of
+// its variance: the density is that of exp(-2 lambda u) / sqrt(u), and errors
+// by chance fill a segment evenly.
+class ErrorsInDisc {
+ public:
+  // Of observations in longer tracks and in tracks of two; pixels.
+  ErrorsInDisc(const std::vector<double>& errors_px,
+               const std::vector<double>& errors_of_two_px, double limit_px);
 
-  int64_t num = 0;
-  double mean = 0;    // of u, at most that of an even disc
-  double lambda = 0;  // the likeliest one, >= 0
+  int64_t num() const { return num_in_disc_ + num_on_segment_; }
+  // Of u, and of 2 u in tracks of two; at most that of chance.
+  double mean() const { return mean_; }
+  double lambda() const { return lambda_; }  // the likeliest one, >= 0
   // The exponent of Chernoff's bound on the probability of such a mean, or of
-  // one farther from that of `other`: num KL(lambda, other) >= 0.
+  // one farther from that of `other`: the divergence of all u, >= 0.
   double Exponent(double other) const;
+
+ private:
+  // If lambda is this.
+  double MeanAt(double lambda) const;
+  double LogFactors(double lambda) const;
+
+  int64_t num_in_disc_ = 0, num_on_segment_ = 0;
+  double mean_ = 0, lambda_ = 0;
 };
+
+// The errors of each image up to the limit to which the model was filtered:
+// their 99.9 % quantile. `errors_px` as PixelErrors gives them.
+std::vector<ErrorsInDisc> FillDiscs(const Model& model,
+                                    const std::vector<double>& errors_px);
 
 // The exponent of Chernoff's bound exp(-exponent) on the probability that so
 // many trials or more succeed, each with probability p; 0 if as many are to be

@@ -35,17 +35,19 @@ Eigen::Matrix<double, 4, 3> TangentBasis(const Vector4d& X) {
   return reflection.leftCols<3>();
 }
 
-// The median distance of the cameras from the median of their centres; 0
-// without cameras.
-double RadiusOfCentres(const std::vector<ImageGeometry>& geometries) {
+}  // namespace
+
+// Relative to the median distance of the cameras from the median of their
+// centres. Points that hold cameras together are as near as rounding allows,
+// 1e-11 and less; a part of a real model may be as small as 1e-7 of it.
+double LeastDistance(const std::vector<ImageGeometry>& geometries) {
   std::vector<Vector3d> centres;
   for (const ImageGeometry& geometry : geometries) {
     if (geometry.has_pose) centres.push_back(Center(geometry.cam_from_world));
   }
-  return centres.empty() ? 0 : MedianDistance(centres, MedianPlace(centres));
+  return centres.empty() ? 0
+                         : 1e-9 * MedianDistance(centres, MedianPlace(centres));
 }
-
-}  // namespace
 
 // Fits a point in homogeneous coordinates, so that one at infinity, or beyond
 // by the noise of its rays, is like any other. The origin is the first camera,
@@ -183,13 +185,15 @@ class TrackNoise::Track {
       const uint64_t e = elements_[n];
       const Vector3d away =
           X_.head<3>() * unit_ + X_[3] * (origin_ - ViewOf(e).center);
-      if (away.norm() < X_[3] * all_.least_distance_ &&
+      const bool is_fit_in = away.norm() < X_[3] * all_.least_distance_;
+      if (is_fit_in &&
           (in_model - ViewOf(e).center).norm() < all_.least_distance_) {
         all_.observations_[e] = NotTested(kInfinity);
-      } else {
-        elements_[num] = e;
-        rows_[num++] = rows_[n];
+        continue;
       }
+      is_in_camera_ = is_in_camera_ || is_fit_in;
+      elements_[num] = e;
+      rows_[num++] = rows_[n];
     }
     elements_.resize(num);
     rows_.resize(num);
@@ -223,6 +227,7 @@ class TrackNoise::Track {
       }
       all_.squared_errors_[e] = sum;
     }
+    all_.is_in_camera_[k_] = is_in_camera_;
     all_.points_[k_] << X_.head<3>() * unit_ + X_[3] * origin_, X_[3];
   }
 
@@ -232,6 +237,7 @@ class TrackNoise::Track {
   std::vector<Row> rows_;
   Vector3d origin_ = Vector3d::Zero();
   double unit_ = 1;
+  bool is_in_camera_ = false;  // in one that still sees it
   Vector4d X_ = Vector4d::Zero();
   double cost_ = 0;
 };
@@ -244,7 +250,8 @@ TrackNoise::TrackNoise(const Model& model,
       takes_part_(model.track_elements.size(), 0),
       observations_(model.track_elements.size()),
       squared_errors_(model.track_elements.size(), 0),
-      points_(model.points3D.size(), Vector4d::Zero()) {
+      points_(model.points3D.size(), Vector4d::Zero()),
+      is_in_camera_(model.points3D.size(), 0) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   for (size_t n = 0; n < geometries.size(); ++n) {
     View view;
@@ -256,9 +263,7 @@ TrackNoise::TrackNoise(const Model& model,
     }
     views_.push_back(view);
   }
-  // Points that hold cameras together are as near as rounding allows, 1e-11
-  // and less; a part of a real model may be as small as 1e-7 of it.
-  least_distance_ = 1e-9 * RadiusOfCentres(geometries);
+  least_distance_ = LeastDistance(geometries);
   for (size_t e = 0; e < model.track_elements.size(); ++e) {
     takes_part_[e] = views_[image_of_[e]].camera != nullptr;
     observations_[e] = NotTested(kNaN);
@@ -291,7 +296,9 @@ Vector2d TrackNoise::ErrorOf(uint64_t e) const {
 Vector3d TrackNoise::Point(int64_t k) const {
   const Vector4d& X = points_[k];
   const Vector3d xyz = X.head<3>() / X[3];
-  return X[3] > 0 && xyz.allFinite() ? xyz : model_.points3D[k].xyz;
+  return X[3] > 0 && xyz.allFinite() && is_in_camera_[k] == 0
+             ? xyz
+             : model_.points3D[k].xyz;
 }
 
 }  // namespace krot::internal

@@ -5,6 +5,7 @@
 #include <sstream>
 #include <vector>
 
+#include "krot/report/part_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/sentences.h"
 #include "krot/report/text_table.h"
@@ -195,6 +196,7 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
   }
   if (summary.precision) text << PrecisionSentence(*summary.precision) << '\n';
   if (report.distances) text << AdjustedDistanceTable(*report.distances);
+  text << LastingFaultLines(report.faults);
   std::string adjusted;
   if (summary.start) {
     adjusted = "found a start in " +
@@ -250,6 +252,8 @@ std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
       {"check_points", SurveyJson(report.check_points, true)},
       {"positions", KnownPositionsJson(report)},
       {"distances", AdjustedDistancesJson(report.distances)},
+      {"num_in_camera", report.faults.num_in_camera},
+      {"num_parts", report.faults.num_parts},
   };
   return ReportText(json, report.run,
                     {{"start", start_seconds}, {"adjust", adjustment.seconds}});

@@ -1,4 +1,5 @@
 #include "krot/report/pair_report.h"
+#include "krot/report/part_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/reports.h"
 
@@ -167,6 +168,8 @@ std::string CheckJson(const CheckReport& report) {
       {"images", images},
       {"observations", observations},
       {"tracks", tracks},
+      {"parts_sentence", PartsSentence(check)},
+      {"parts", PartsJson(check)},
   };
   return ReportText(json, report.run, {{"check", report.seconds_check}});
 }

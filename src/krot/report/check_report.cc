@@ -6,6 +6,7 @@
 
 #include "krot/base/numbers.h"
 #include "krot/report/pair_report.h"
+#include "krot/report/part_report.h"
 #include "krot/report/text_table.h"
 
 namespace krot::internal {
@@ -35,12 +36,6 @@ std::vector<const ImageCheck*> ImagesOf(const ModelCheck& check,
     SortLargestFirst(&images, &ImageCheck::num_wrong);
   }
   return images;
-}
-
-// For example "0.0123"; "anywhere" if nothing holds the image.
-std::string SigmaText(double sigma) {
-  if (!std::isfinite(sigma)) return "anywhere";
-  return sigma < 1e-3 ? Scientific(sigma) : FormatNumber(sigma, 3);
 }
 
 std::string ImageTable(const ModelCheck& check, ImageVerdict verdict,
@@ -90,11 +85,12 @@ std::string ObservationTable(const ModelCheck& check, size_t max_rows) {
   table.AddRow({"image", "2D point", "3D point", "w", "error, px", ""});
   for (size_t n = 0; n < std::min(check.observations.size(), max_rows); ++n) {
     const WrongObservation& one = check.observations[n];
-    table.AddRow({one.image_name, std::to_string(one.point2D_idx),
-                  std::to_string(one.point3D_id),
-                  std::isfinite(one.w) ? FormatNumber(one.w, 1) : "not in front",
-                  FormatNumber(one.error_px, 2),
-                  one.is_of_two ? "this or the other one" : ""});
+    table.AddRow(
+        {one.image_name, std::to_string(one.point2D_idx),
+         std::to_string(one.point3D_id),
+         std::isfinite(one.w) ? FormatNumber(one.w, 1) : "not in front",
+         FormatNumber(one.error_px, 2),
+         one.is_of_two ? "this or the other one" : ""});
   }
   return "\nWrong observations, of images that are not wrong: w, the error "
          "over "
@@ -132,7 +128,8 @@ std::string NextSteps(const CheckReport& report) {
   const ModelCheck& check = report.check;
   const int64_t num_wrong = check.NumImages(ImageVerdict::kWrong);
   const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
-  if (!check.IsAnythingWrong() && num_weak == 0 && check.is_adjusted) {
+  if (!check.IsAnythingWrong() && num_weak == 0 && check.parts.empty() &&
+      check.is_adjusted) {
     return "";
   }
   const auto or_name = [](const std::string& path, const char* name) {
@@ -182,15 +179,18 @@ std::string NextSteps(const CheckReport& report) {
         "feature_extractor --ImageReader.single_camera 1 --database_path " +
         database + " --image_path IMAGES\n";
   }
-  if (num_weak > 0) {
-    text +=
-        "  More matches for the weakly held images, and their points:\n    "
-        "colmap exhaustive_matcher --database_path " +
-        database +
-        " --SiftMatching.guided_matching 1\n    colmap point_triangulator "
-        "--database_path " +
-        database + " --image_path IMAGES --input_path " + model +
-        " --output_path TRIANGULATED\n";
+  if (num_weak > 0 || !check.parts.empty()) {
+    text += "  More matches for " +
+            std::string(num_weak > 0 ? "the weakly held images" : "") +
+            (num_weak > 0 && !check.parts.empty() ? " and " : "") +
+            (check.parts.empty() ? "" : "between the parts") +
+            ", and their points:\n    "
+            "colmap exhaustive_matcher --database_path " +
+            database +
+            " --SiftMatching.guided_matching 1\n    colmap point_triangulator "
+            "--database_path " +
+            database + " --image_path IMAGES --input_path " + model +
+            " --output_path TRIANGULATED\n";
     model = "TRIANGULATED";
   }
   if (!check.cauchy_scale_px) {
@@ -298,8 +298,12 @@ std::string ForAdjusted(const CheckReport& report) {
          " observations of " + Counted(num_images, "image") + " agree within " +
          noise +
          (num_weak > 0 ? "; " + Counted(num_weak, "image") + Are(num_weak) +
-                             "weakly held."
-                       : ".");
+                             "weakly held"
+                       : "") +
+         (check.parts.empty()
+              ? "."
+              : "; but " + Counted(check.parts.size(), "part") +
+                    (check.parts.size() > 1 ? " are" : " is") + " loose.");
 }
 
 }  // namespace
@@ -324,6 +328,7 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
       " weakly held, " + Thousands(check.NumImages(ImageVerdict::kFine)) +
       " fine. Observations that others check: " + Thousands(check.num_tested) +
       ".\n";
+  if (!check.parts.empty()) text += PartsSentence(check) + "\n";
   if (!check.is_adjusted) {
     text +=
         "Not adjusted: most images do not stand where their own errors would "
@@ -332,8 +337,8 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
   if (check.pairs) text += PairTable(*check.pairs, max_rows);
   return text + ImageTable(check, ImageVerdict::kWrong, num_rows) +
          ImageTable(check, ImageVerdict::kWeaklyHeld, num_rows) +
-         ObservationTable(check, num_rows) + TrackTable(check, num_rows) +
-         NextSteps(report) + "\n" +
+         PartTable(check, num_rows) + ObservationTable(check, num_rows) +
+         TrackTable(check, num_rows) + NextSteps(report) + "\n" +
          RunSentence(report.run,
                      "checked " + FormatNumber(report.seconds_check, 2) + " s");
 }

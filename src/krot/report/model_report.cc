@@ -7,6 +7,7 @@
 
 #include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
+#include "krot/report/part_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
@@ -65,6 +66,7 @@ ModelReport AnalyzeModel(const Model& model, int num_worst) {
   report.num_tracks_with_repeated_image = std::count_if(
       model.points3D.begin(), model.points3D.end(),
       [&](const Point3D& point) { return RepeatsAnImage(model, point); });
+  report.faults = FindLastingFaults(model);
   report.depth = ComputeDepthStatistics(model);
   report.triangulation_angle_deg = TriangulationAnglesDeg(model);
   return report;
@@ -244,6 +246,7 @@ std::string ModelTable(const ModelReport& report, int max_rows) {
          CameraErrorTable(report.cameras, num_rows) +
          ImageErrorTable(report.images, num_rows) + WorstTable(report.worst) +
          NoiseTable(report.noise) + TrackTable(report) + GeometryTable(report) +
+         LastingFaultLines(report.faults) +
          (report.distances ? DistanceTable(*report.distances, {"model"}) : "");
 }
 
@@ -357,6 +360,8 @@ std::string ModelJson(const ModelReport& report, const std::string& version) {
       {"noise", NoiseJson(report.noise)},
       {"track_lengths", TrackLengthsJson(report.track_lengths)},
       {"num_tracks_with_repeated_image", report.num_tracks_with_repeated_image},
+      {"num_in_camera", report.faults.num_in_camera},
+      {"num_parts", report.faults.num_parts},
       {"distances", DistancesJson(report.distances, {"model"})},
       {"depth",
        {{"count", depth.count},

@@ -10,6 +10,7 @@
 
 #include "krot/analysis/model_comparison.h"
 #include "krot/analysis/model_input.h"
+#include "krot/analysis/model_parts.h"
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/noise.h"
 #include "krot/check.h"
@@ -36,6 +37,7 @@ struct AdjustmentReport {
   std::optional<PositionFrame> position_frame;  // if they have their own
   bool is_in_position_frame = false;            // what is written
   std::optional<DistanceComparison> distances;
+  LastingFaults faults;  // of what is written
 };
 
 // Each known distance beside the adjusted one; a sentence for each that is
@@ -125,9 +127,9 @@ std::string ReasonOf(const ModelCheck& check, const ImageCheck& image);
 // "Nothing is wrong", with the reason.
 std::string CheckSentence(const CheckReport& report);
 
-// For the terminal: the sentence, the verdict of the matches (PairTable),
-// images by verdict, observations by w, tracks of two points, and what to do
-// next. At most max_rows of each.
+// For the terminal: the sentences, the verdict of the matches (PairTable),
+// images by verdict, weak parts, observations by w, tracks of two points, and
+// what to do next. At most max_rows of each.
 std::string CheckTable(const CheckReport& report, int max_rows);
 
 // report.json; docs/cli.md lists its keys. What is not known is null.
@@ -194,6 +196,7 @@ struct ModelReport {
   DepthStatistics depth;
   ValueRange triangulation_angle_deg;
   std::optional<DistanceReport> distances;
+  LastingFaults faults;
 };
 
 // Collects the figures of a model. Requires a valid model (ValidateModel) and

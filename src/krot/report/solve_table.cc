@@ -309,7 +309,9 @@ std::string SolveTable(const SolveReport& report) {
   if (summary.num_components > 1) {
     text << "The problem falls into "
          << Counted(summary.num_components, "component")
-         << " without observations in common; each is solved.\n";
+         << " that share no track, each solved by itself: none tells where "
+            "they stand relative to each other, nor in which scale; krot "
+            "model_checker lists them.\n";
   }
   text << LooseSentences(summary.loose, summary.num_images)
        << (report.position_frame

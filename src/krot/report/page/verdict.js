@@ -78,6 +78,7 @@ export function verdict(report) {
 
 // What the verdict holds for.
 export function scope(report) {
+  if (report.command === 'model_checker') return report.parts_sentence;
   return report.certified ?
     'The proof is for the rotations, intrinsics and observations as given, ' +
     'of the observations that took part in the optimisation.' : '';

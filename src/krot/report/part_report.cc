@@ -1,0 +1,118 @@
+#include "krot/report/part_report.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "krot/base/numbers.h"
+#include "krot/report/text_table.h"
+
+namespace krot::internal {
+
+std::string SigmaText(double sigma) {
+  if (!std::isfinite(sigma)) return "anywhere";
+  return sigma < 1e-3 ? Scientific(sigma) : FormatNumber(sigma, 3);
+}
+
+namespace {
+
+std::string NameOfFirst(const ModelCheck& check, const ModelPart& part) {
+  return check.images[part.images.front()].name +
+         (part.images.size() > 1 ? ", ..." : "");
+}
+
+bool IsApart(const ModelPart& part) { return part.num_tracks == 0; }
+
+}  // namespace
+
+std::string PartsSentence(const ModelCheck& check) {
+  std::vector<const ModelPart*> apart, weak;
+  for (const ModelPart& part : check.parts) {
+    (IsApart(part) ? apart : weak).push_back(&part);
+  }
+  const auto words = [&](const ModelPart& part) {
+    return Counted(part.images.size(), "image") + " (" +
+           NameOfFirst(check, part) + ")";
+  };
+  std::string text;
+  if (!apart.empty()) {
+    text = "The model falls into " + Counted(apart.size() + 1, "part") +
+           " that share no track, so none tells where " +
+           words(*apart.front()) +
+           (apart.size() > 1 ? " and the other small parts" : "") +
+           (apart.size() > 1 || apart.front()->images.size() > 1 ? " stand"
+                                                                 : " stands") +
+           " relative to the rest, nor in which scale.";
+  }
+  if (weak.empty()) return text;
+  const ModelPart& weakest = **std::max_element(
+      weak.begin(), weak.end(), [](const ModelPart* a, const ModelPart* b) {
+        return a->relative_center_sigma < b->relative_center_sigma;
+      });
+  const bool is_held = std::isfinite(weakest.relative_center_sigma);
+  return text + (text.empty() ? "" : " ") +
+         Counted(weakest.num_tracks, "track") +
+         (weakest.num_tracks == 1 ? " ties " : " tie ") + words(weakest) +
+         " to the rest " +
+         (is_held ? "so weakly that noise alone may have moved them, all "
+                    "together, by " +
+                        FormatNumber(100 * weakest.relative_center_sigma, 0) +
+                        " % of the cameras' radius (standard deviation)"
+                  : "and leave their common place, turn or scale open") +
+         (weak.size() > 1 ? "; " + Counted(weak.size() - 1, "other part") +
+                                (weak.size() > 2 ? " are" : " is") + " as loose"
+                          : "") +
+         ".";
+}
+
+std::string PartTable(const ModelCheck& check, size_t max_rows) {
+  if (check.parts.empty() || max_rows == 0) return "";
+  TextTable table;
+  table.AddRow({"images of the part", "tracks it shares", "cameras +-",
+                "% of the radius"});
+  for (size_t n = 0; n < std::min(check.parts.size(), max_rows); ++n) {
+    const ModelPart& part = check.parts[n];
+    table.AddRow(
+        {Thousands(part.images.size()) + " (" + NameOfFirst(check, part) + ")",
+         std::to_string(part.num_tracks), SigmaText(part.center_sigma),
+         std::isfinite(part.relative_center_sigma)
+             ? FormatNumber(100 * part.relative_center_sigma, 1)
+             : "-"});
+  }
+  return "\nParts that tracks do not tie to the rest firmly: " +
+         Thousands(check.parts.size()) + "\n" + table.ToString();
+}
+
+nlohmann::ordered_json PartsJson(const ModelCheck& check) {
+  return ListJson(check.parts, [&](const ModelPart& part) -> Json {
+    Json names = Json::array();
+    for (const int32_t n : part.images) names.push_back(check.images[n].name);
+    return {{"num_tracks", part.num_tracks},
+            {"center_sigma", FiniteOrNull(part.center_sigma)},
+            {"relative_center_sigma", FiniteOrNull(part.relative_center_sigma)},
+            {"images", names}};
+  });
+}
+
+std::string LastingFaultLines(const LastingFaults& faults) {
+  std::string text;
+  if (faults.num_in_camera > 0) {
+    text += Counted(faults.num_in_camera, "observation") +
+            (faults.num_in_camera == 1 ? " sees a point that lies"
+                                       : " see points that lie") +
+            " in the camera itself, which no adjustment mends: krot "
+            "model_checker --output_path, or krot outlier_filter, removes " +
+            (faults.num_in_camera == 1 ? "it" : "them") + ".\n";
+  }
+  if (faults.num_parts > 1) {
+    text +=
+        "The model falls into " + Counted(faults.num_parts, "part") +
+        " that share no track (" + Thousands(faults.num_images_outside) +
+        " of " + Counted(faults.num_images, "image") +
+        " are outside the largest), so none tells where they stand relative "
+        "to each other, nor in which scale; krot model_checker lists "
+        "them.\n";
+  }
+  return text;
+}
+
+}  // namespace krot::internal
