@@ -58,8 +58,8 @@ std::vector<GroupPair> Groups::Pairs() const {
   }
   std::vector<GroupPair> pairs;
   std::vector<int32_t> pair_of(sizes_.size());  // with group a, in `pairs`
-  // The pair and the frame of each track that a single frame of one of the
-  // groups sees.
+  // The pair and the frame of each tying track that only one frame of one of
+  // the groups sees.
   std::vector<std::pair<int32_t, int32_t>> located;
   for (int32_t a = 0; a < static_cast<int32_t>(sizes_.size()); ++a) {
     const auto begin = static_cast<int32_t>(pairs.size());

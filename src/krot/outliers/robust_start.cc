@@ -81,8 +81,8 @@ Estimate StartByProgramme(const KnownRotationProblem& problem,
   Estimate own = part.Restrict(estimate);
   SlackOptions options;
   options.norm = norm;
-  options.smallest_mu = 1e-3;  // a start needs no smaller
-  options.max_iterations = 30;  // nor does it get better
+  options.smallest_mu = 1e-3;   // a start needs no smaller
+  options.max_iterations = 30;  // where it takes more, it gets no better
   for (int n = 1; n <= 2 && !context.IsCancelled(); ++n) {
     context.Stage("positions from rotations and tracks, programme", n, 2);
     const SlackSolution solution =
