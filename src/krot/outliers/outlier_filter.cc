@@ -170,6 +170,7 @@ class OutlierFilter : private Filtering {
         summary_.init == SolveInit::kFeasible && !options_.find_conflicts;
     Removal removal = FindRemoval(model_, built, bound_, context_,
                                   is_enough ? 0 : kMaxProgrammes);
+    if (is_enough && !options_.max_error) bound_.max_error *= kRoomOfFinish;
     summary_.seconds_removal = timer.Seconds();
     return removal;
   }

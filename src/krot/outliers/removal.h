@@ -96,6 +96,10 @@ class RemovalSearch {
   std::vector<char> is_tight_;
 };
 
+// Where noise chose a bound for the errors at a start from nothing, the finish
+// may raise them by a tenth: it needs half as many iterations with that room.
+inline constexpr double kRoomOfFinish = 1.1;
+
 // A search for a single bound.
 inline constexpr int kMaxProgrammes = 16;
 Removal FindRemoval(const Model& model, const BuiltProblem& built,

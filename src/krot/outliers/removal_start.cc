@@ -249,7 +249,8 @@ RemovalStart FindRemovalStart(const Model& model,
     }
     context.Note("leaving out what noise of " + Pixels(noise.sigma) +
                  " per axis does not explain: errors above " +
-                 Pixels(start.max_error));
+                 Pixels(start.max_error) + "; the others may rise to " +
+                 Pixels(kRoomOfFinish * start.max_error));
   }
   if (options.has_start_from_nothing) start.init = SolveInit::kFeasible;
   return start;
