@@ -385,6 +385,22 @@ TEST(NothingToSolve, SaysWhy) {
             "short_track 1000)");
 }
 
+TEST(UnreliableSentence, NamesTheThreeLargestOfManyParts) {
+  OutlierFilterSummary summary;
+  summary.init = SolveInit::kFeasible;
+  for (const size_t num_images : {2u, 5u, 3u, 9u, 2u}) {
+    WeakPart& part = summary.weak_parts.emplace_back();
+    part.image_names.resize(num_images, "a.jpg");
+    part.is_held = false;
+  }
+  const std::string words = UnreliableSentence(summary);
+  for (const char* named : {"9 images (", "5 images (", "3 images ("}) {
+    EXPECT_THAT(words, HasSubstr(named));
+  }
+  EXPECT_THAT(words, Not(HasSubstr("2 images (")));
+  EXPECT_THAT(words, HasSubstr("2 smaller parts are not held either"));
+}
+
 TEST(NormName, IsWhatTheOptionTakes) {
   EXPECT_EQ(NormName(Norm::L1()), "1");
   EXPECT_EQ(NormName(Norm::L2()), "2");

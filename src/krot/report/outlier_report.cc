@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "krot/outliers/robust_start.h"
 #include "krot/report/report_json.h"
@@ -74,8 +75,20 @@ std::string UnreliableSentence(const OutlierFilterSummary& summary) {
   const auto add = [&](const std::string& reason) {
     words += (words.empty() ? "" : "; ") + reason;
   };
+  std::vector<const WeakPart*> parts;
   for (const WeakPart& part : summary.weak_parts) {
-    if (!part.is_held && !part.is_frame) add(WeakPartWords(part));
+    if (!part.is_held && !part.is_frame) parts.push_back(&part);
+  }
+  std::stable_sort(parts.begin(), parts.end(),
+                   [](const WeakPart* a, const WeakPart* b) {
+                     return a->image_names.size() > b->image_names.size();
+                   });
+  const size_t num_told = std::min<size_t>(3, parts.size());
+  for (size_t n = 0; n < num_told; ++n) add(WeakPartWords(*parts[n]));
+  if (parts.size() > num_told) {
+    const auto more = static_cast<int64_t>(parts.size() - num_told);
+    add(Counted(more, "smaller part") + (more == 1 ? " is" : " are") +
+        " not held either (--report_path lists all)");
   }
   if (!words.empty()) {
     words +=

@@ -225,8 +225,8 @@ std::string BracketSentence(const OutlierFilterSummary& summary);
 
 // Says why positions from nothing are not reliable, and what to do next: the
 // scale of a part is hardly held, the bound is beyond reason, or more
-// observations do not fit than do. Empty if they are reliable, or not from
-// nothing.
+// observations do not fit than do. Of the parts it names the three with most
+// images. Empty if they are reliable, or not from nothing.
 std::string UnreliableSentence(const OutlierFilterSummary& summary);
 
 // OutlierFilterSummary::weak_parts as an array: [{"image_names": ..}].
