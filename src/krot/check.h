@@ -190,6 +190,35 @@ struct ModelPart {
   double relative_center_sigma = 0;
 };
 
+// What all images of a camera share, and what may be wrong with it.
+enum class CameraFault {
+  kFocalLength,
+  kPrincipalPoint,
+  kDistortion,
+  kPlaceInRig,
+};
+
+// A camera that contradicts the observations of its images: another focal
+// length, principal point, distortion or place in its rig takes at least a
+// tenth of their squared errors away, with all poses and points free to move
+// along.
+struct WrongCamera {
+  CameraId camera_id = 0;
+  CameraFault fault = CameraFault::kFocalLength;
+  int64_t num_images = 0;
+  // By how much the squared errors of all images fall, relative to those of the
+  // camera's own, to first order; in [0, 1].
+  double gain = 0;
+  // The mean focal length, as it is and as the images ask for, pixels.
+  double focal_length_px = 0;
+  double asked_focal_length_px = 0;
+  // kPrincipalPoint: by how much it is off, pixels.
+  double offset_px = 0;
+  // kPlaceInRig: the turn and shift that the images ask for.
+  double turn_deg = 0;
+  double shift = 0;  // scene units
+};
+
 struct ModelCheckOptions {
   // Must be read for this model (ReadDatabase). None: the model alone is
   // judged. If it has keypoint scales, the noise of an observation is taken to
@@ -217,6 +246,10 @@ struct ModelCheck {
   // of an image's noise. If not, no image can be called misplaced, and the
   // model should be adjusted first.
   bool is_adjusted = true;
+  // If there are any, observations and images may look wrong only because of
+  // them: the model should be adjusted with what is wrong free, and be checked
+  // again. The largest gain first.
+  std::vector<WrongCamera> cameras;
   int64_t num_tested = 0;          // observations of images that are not wrong
   std::vector<ImageCheck> images;  // as Model::images
   // Wrong observations of images that are not wrong; largest w first.
@@ -228,7 +261,8 @@ struct ModelCheck {
 
   int64_t NumImages(ImageVerdict verdict) const;
   bool IsAnythingWrong() const {
-    return !observations.empty() || NumImages(ImageVerdict::kWrong) > 0 ||
+    return !observations.empty() || !cameras.empty() ||
+           NumImages(ImageVerdict::kWrong) > 0 ||
            (pairs && pairs->IsAnythingWrong());
   }
 };

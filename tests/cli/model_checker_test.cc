@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/model.h"
+#include "krot/model/rigs.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
@@ -119,6 +120,90 @@ TEST_F(ModelCheckerCommand, HasAModelThatIsNotAdjustedAdjustedFirst) {
   EXPECT_THAT(RunWhatIsNext(result.out),
               ElementsAre("bundle_adjuster", "model_checker"));
   EXPECT_THAT(Check("ADJUSTED").out, StartsWith("Nothing is wrong: all "));
+}
+
+// A model that was adjusted with its cameras held, though one of them is wrong.
+class WrongCameraCommand : public ModelCheckerCommand {
+ protected:
+  static Model Scene(int sensors_per_rig) {
+    SceneOptions options;
+    options.num_frames = 20;
+    options.num_points = 1000;
+    options.pixel_noise = 1;
+    options.sensors_per_rig = sensors_per_rig;
+    options.has_rigs = sensors_per_rig > 1;
+    return SynthesizeScene(options).ground_truth;
+  }
+
+  // Every other image has a camera of the same values, 2.
+  static Model TwoCameras() {
+    Model model = Scene(1);
+    model.cameras.push_back(model.cameras[0]);
+    model.cameras[1].id = 2;
+    for (size_t n = 1; n < model.images.size(); n += 2) {
+      model.images[n].camera_id = 2;
+    }
+    UseTrivialRigs(&model);
+    return model;
+  }
+
+  // That the first line blames camera 2 with these words, and that the next
+  // steps mend it.
+  void ExpectBlamedAndMended(const Model& model, const std::string& fault,
+                             const std::string& words) const {
+    Save(model, folder_ / "input");
+    const KrotResult held = RunKrot(
+        {"bundle_adjuster", "--input_path", folder_ / "input", "--output_path",
+         folder_ / "held", "--BundleAdjustment.refine_focal_length", "0",
+         "--BundleAdjustment.refine_extra_params", "0",
+         "--BundleAdjustment.refine_sensor_from_rig", "0"});
+    ASSERT_EQ(held.exit_code, 0) << held.err;
+    const KrotResult result =
+        Check("held", {"--report_path", folder_ / "r.json"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out, StartsWith("Camera 2 is wrong: " + words));
+    EXPECT_THAT(result.out, HasSubstr("\nWrong cameras\n"));
+    const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+    ASSERT_EQ(report["cameras"].size(), 1u);
+    EXPECT_EQ(report["cameras"][0]["camera_id"], 2);
+    EXPECT_EQ(report["cameras"][0]["fault"], fault);
+    EXPECT_EQ(report["num_wrong_images"], 0);
+    EXPECT_TRUE(report["is_anything_wrong"]);
+    EXPECT_EQ(Check("held", {"--fail_on", "wrong"}).exit_code, 9);
+    EXPECT_THAT(RunWhatIsNext(result.out),
+                ElementsAre("bundle_adjuster", "model_checker"));
+    EXPECT_THAT(Check("ADJUSTED").out, StartsWith("Nothing is wrong: all "));
+  }
+};
+
+TEST_F(WrongCameraCommand, IsToldByItsFocalLength) {
+  Model model = TwoCameras();
+  model.cameras[1].params[0] *= 1.08;
+  ExpectBlamedAndMended(
+      model, "focal length",
+      "its focal length is 1105.9 px, and its 10 images ask for about 10");
+}
+
+TEST_F(WrongCameraCommand, IsToldByItsPrincipalPoint) {
+  Model model = TwoCameras();
+  model.cameras[1].params[1] += 40;
+  ExpectBlamedAndMended(
+      model, "principal point",
+      "its 10 images ask for another principal point, about ");
+}
+
+TEST_F(WrongCameraCommand, IsToldByItsPlaceInTheRig) {
+  Model model = Scene(3);
+  Pose& place = *model.rigs[0].sensors[0].sensor_from_rig;
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(0.01, Eigen::Vector3d(1, 2, 2) / 3).matrix();
+  place = ToPose({turn * place.Rotation(), turn * place.translation});
+  ExpectBlamedAndMended(
+      model, "place in rig",
+      "its 20 images ask for another place in its rig, turned by about 0.5");
+  EXPECT_NEAR(
+      Json::parse(ReadBytes(folder_ / "r.json"))["cameras"][0]["turn_deg"],
+      0.573, 0.02);
 }
 
 TEST_F(ModelCheckerCommand, EndsWithCode9WhereAScriptAsks) {

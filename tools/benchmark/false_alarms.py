@@ -95,10 +95,10 @@ def main():
     krot = pathlib.Path(sys.argv[1]).resolve()
     num_scenes = int(sys.argv[2]) if len(sys.argv) > 2 else 200
     print("| noise | scene | scenes | with an alarm | wrong observations | of | "
-          "of an image, at most | wrong images | weakly held |\n"
-          "|---|---|---|---|---|---|---|---|---|")
+          "of an image, at most | wrong images | weakly held | wrong cameras |\n"
+          "|---|---|---|---|---|---|---|---|---|---|")
     for noise in NOISES:
-        rows = {kind: [0, 0, 0, 0, 0.0, 0, 0] for kind in [*KINDS, "all"]}
+        rows = {kind: [0, 0, 0, 0, 0.0, 0, 0, 0] for kind in [*KINDS, "all"]}
         for seed in range(1, num_scenes + 1):
             kind = list(KINDS)[seed % len(KINDS)]
             report = trial(krot, kind, noise, seed)
@@ -112,9 +112,11 @@ def main():
                 row[4] = max(row[4], share)
                 row[5] += report["num_wrong_images"]
                 row[6] += report["num_weakly_held_images"]
+                row[7] += len(report["cameras"])
         for kind, row in rows.items():
             print(f"| {noise} | {kind} | {row[0]} | {row[1]} | {row[2]} | "
-                  f"{row[3]} | {100 * row[4]:.1f} % | {row[5]} | {row[6]} |",
+                  f"{row[3]} | {100 * row[4]:.1f} % | {row[5]} | {row[6]} | "
+                  f"{row[7]} |",
                   flush=True)
 
 

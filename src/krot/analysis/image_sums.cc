@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "krot/analysis/pose_rows.h"
 #include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/geometry/transform.h"
@@ -21,19 +22,11 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
-using Matrix26 = Eigen::Matrix<double, 2, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 // For smaller lambda the density is nearly even, and a series replaces formulas
 // that would lose digits.
 constexpr double kFlat = 1e-4;
-
-// An observation at the least squares of its track.
-struct PoseRow {
-  int32_t image = 0;
-  Vector2d error;
-  Matrix26 F;  // by the camera's rotation (from the left) and centre
-};
 
 void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> of_R;
@@ -78,81 +71,6 @@ double LargestSpread(const Matrix3d& A, const Matrix3d& B, const Matrix3d& C) {
   const bool is_held = values[0] > kNoDirection * A.trace();
   return is_held ? 1 / std::sqrt(values[0]) : kInfinity;
 }
-
-class ImageAdder {
- public:
-  ImageAdder(const Model& model, const ModelNoise& noise)
-      : model_(model), noise_(noise), image_of_(ImagesOfElements(model)) {}
-
-  std::vector<ImageSums> Run() {
-    const std::vector<ImageGeometry> geometries = ImageGeometries(model_);
-    sums_.assign(model_.images.size(), {});
-    std::vector<std::vector<double>> distances(model_.images.size());
-    for (size_t k = 0; k < model_.points3D.size(); ++k) {
-      const Point3D& point = model_.points3D[k];
-      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-        const int32_t n = image_of_[e];
-        if (!geometries[n].has_pose) continue;
-        distances[n].push_back(
-            (geometries[n].cam_from_world * noise_.points[k]).norm());
-      }
-    }
-    nearest_.assign(model_.images.size(), 0);
-    for (size_t n = 0; n < distances.size(); ++n) {
-      if (distances[n].empty()) continue;
-      // A nearer point would drown all others in rounding.
-      nearest_[n] = 1e-6 * Median(std::move(distances[n]));
-    }
-    for (size_t k = 0; k < model_.points3D.size(); ++k) {
-      AddTrack(k, geometries);
-    }
-    for (ImageSums& sums : sums_) Solve(&sums);
-    return std::move(sums_);
-  }
-
- private:
-  void AddTrack(size_t k, const std::vector<ImageGeometry>& geometries) {
-    const Point3D& point = model_.points3D[k];
-    std::vector<PoseRow> rows;
-    Matrix3d H = Matrix3d::Zero();
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      if (noise_.observations[e].num_controlled == 0) continue;
-      const int32_t n = image_of_[e];
-      const RigidTransform& pose = geometries[n].cam_from_world;
-      const Camera& camera = model_.cameras[geometries[n].camera];
-      const Point2D& pixel =
-          model_.images[n].points2D[model_.track_elements[e].point2D_idx];
-      const Vector3d x_cam = pose * noise_.points[k];
-      if (!(x_cam.norm() > nearest_[n])) continue;
-      const auto E = RowAtProjection(camera, {pixel.x, pixel.y}, x_cam);
-      if (!E) continue;
-      const double depth = E->row(0).dot(x_cam);
-      PoseRow row;
-      row.image = n;
-      row.error = noise_.observations[e].error_px;
-      const Matrix23 by_cam = (E->bottomRows<2>() -
-                               E->bottomRows<2>() * x_cam / depth * E->row(0)) /
-                              depth;
-      row.F << -by_cam * CrossMatrix(x_cam), -by_cam * pose.rotation;
-      if (!row.F.allFinite()) continue;
-      H.noalias() += row.F.rightCols<3>().transpose() * row.F.rightCols<3>();
-      rows.push_back(row);
-    }
-    if (rows.size() < 2) return;
-    const Matrix3d root = RootOfInverse(H);
-    for (const PoseRow& row : rows) {
-      const Matrix23 B = row.F.rightCols<3>() * root;
-      const Eigen::Matrix2d R = Eigen::Matrix2d::Identity() - B * B.transpose();
-      Add(row, R, &sums_[row.image]);
-    }
-  }
-
-  const Model& model_;
-  const ModelNoise& noise_;
-  const std::vector<int32_t> image_of_;  // by track element
-  std::vector<ImageSums> sums_;
-  std::vector<double> nearest_;  // distance of a point, by image; scene units
-};
 
 }  // namespace
 
@@ -263,15 +181,26 @@ std::vector<ErrorsInDisc> FillDiscs(const Model& model,
   return discs;
 }
 
+// P(chi^2 > 2 x) = exp(-x) sum x^i / i!, and for Beta(j, m) P(> s) =
+// (1 - s)^m sum (m + i - 1 over i) s^i, with j terms each.
+double GainExponent(double gain, double square, int64_t num_directions,
+                    int num_parameters, double sigma_px) {
+  const double num_terms = (num_parameters + 1) / 2;
+  const double m = static_cast<double>(num_directions) / 2 - num_terms;
+  if (!(m > 0) || !(gain > 0)) return 0;
+  const double x = gain / (2 * sigma_px * sigma_px);
+  const double share = std::min(gain / square, 1 - 1e-12);
+  double by_model = 1, model_term = 1, by_own = 1, own_term = 1;
+  for (double i = 1; i < num_terms; ++i) {
+    by_model += model_term *= x / i;
+    by_own += own_term *= (m + i - 1) / i * share;
+  }
+  return std::min(x - std::log(by_model),
+                  -m * std::log1p(-share) - std::log(by_own));
+}
+
 double ImageSums::GainExponent(double sigma_px) const {
-  const double m = (static_cast<double>(num_directions) - 6) / 2;
-  if (!(m > 0)) return 0;
-  const double x = Gain() / (2 * sigma_px * sigma_px);
-  const double by_model = x - std::log1p(x + x * x / 2);
-  const double share = GainShare();
-  const double by_own = -m * std::log1p(-share) -
-                        std::log1p(m * share + m * (m + 1) / 2 * share * share);
-  return std::min(by_model, by_own);
+  return internal::GainExponent(Gain(), square, num_directions, 6, sigma_px);
 }
 
 double SuccessExponent(int64_t num_successes, int64_t num_trials, double p) {
@@ -285,7 +214,23 @@ double SuccessExponent(int64_t num_successes, int64_t num_trials, double p) {
 
 std::vector<ImageSums> AddUpImages(const Model& model,
                                    const ModelNoise& noise) {
-  return ImageAdder(model, noise).Run();
+  const PoseRows all(model, noise);
+  std::vector<ImageSums> sums(model.images.size());
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    const std::vector<PoseRow> rows = all.Of(k);
+    Matrix3d H = Matrix3d::Zero();
+    for (const PoseRow& row : rows) {
+      H.noalias() += row.F.rightCols<3>().transpose() * row.F.rightCols<3>();
+    }
+    const Matrix3d root = RootOfInverse(H);
+    for (const PoseRow& row : rows) {
+      const Matrix23 B = row.F.rightCols<3>() * root;
+      const Eigen::Matrix2d R = Eigen::Matrix2d::Identity() - B * B.transpose();
+      Add(row, R, &sums[row.image]);
+    }
+  }
+  for (ImageSums& of_image : sums) Solve(&of_image);
+  return sums;
 }
 
 }  // namespace krot::internal

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "krot/analysis/camera_check.h"
 #include "krot/analysis/model_parts.h"
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/noise.h"
@@ -48,6 +49,7 @@ class Checker {
       check_.points.push_back(point.xyz);
     }
     if (options_.database != nullptr) AskMatches();
+    bool judges_cameras = true;
     do {
       snooping_ = SnoopNoise(model_, noise_options_, context_);
       if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
@@ -57,7 +59,12 @@ class Checker {
       }
       Count();
       sums_ = AddUpImages(model_, snooping_.noise);
+      check_.is_adjusted = IsAdjusted();
+      if (judges_cameras) JudgeCameras();
+      judges_cameras = !check_.cameras.empty();
     } while (CallWrong(WorstImage()) || CallUnsupported());
+    const int64_t num_wrong = check_.NumImages(ImageVerdict::kWrong);
+    if (num_wrong > 0 && !judges_cameras) JudgeCameras();
     Describe();
     FindSecondPoints();
     HowFirmly();
@@ -97,7 +104,7 @@ class Checker {
     if (n < 0) return false;
     check_.images[n].verdict = ImageVerdict::kWrong;
     for (size_t e = 0; e < image_of_.size(); ++e) {
-      if (image_of_[e] == n) noise_options_.is_left_out[e] = 1;
+      noise_options_.is_left_out[e] |= image_of_[e] == n;
     }
     return true;
   }
@@ -122,6 +129,22 @@ class Checker {
       if (snooping_.noise.observations[e].num_controlled == 0) continue;
       ++check_.images[image_of_[e]].num_tested;
     }
+  }
+
+  bool IsAdjusted() const {
+    // A pose takes 0.005 of the median image's squared errors at most in
+    // adjusted real models, and 0.1 to 0.2 in their minimax solutions.
+    const auto gain = [&](size_t n) { return sums_[n].UnexpectedGainShare(); };
+    return snooping_.noise.sigma_px.value_or(0) < kLeastNoisePx ||
+           MedianOfSound(gain) < 0.1;
+  }
+
+  // A camera of one image is judged as an image is, in an adjusted model.
+  void JudgeCameras() {
+    check_.cameras = FindWrongCameras(
+        model_, snooping_.noise, sums_, check_.is_adjusted ? 1 : 2,
+        options_.false_alarm, context_.num_threads);
+    check_.is_adjusted = check_.is_adjusted && check_.cameras.empty();
   }
 
   // The image that most speaks against, -1: none; sets its fault.
@@ -155,12 +178,6 @@ class Checker {
           const ImageCheck& image = check_.images[n];
           return static_cast<double>(2 * image.num_wrong - image.num_tested);
         });
-    // A pose takes 0.005 of the median image's squared errors at most in
-    // adjusted real models, and 0.1 to 0.2 in their minimax solutions.
-    check_.is_adjusted = snooping_.noise.sigma_px.value_or(0) < kLeastNoisePx ||
-                         MedianOfSound([&](size_t n) {
-                           return sums_[n].UnexpectedGainShare();
-                         }) < 0.1;
     if (check_.is_adjusted) {
       ask(
           ImageFault::kMisplaced, [&](size_t n) { return IsMisplaced(n); },
@@ -207,8 +224,7 @@ class Checker {
     return !few.empty();
   }
 
-  // From this x on a bound exp(-x) on the probability of a test is low enough,
-  // over all images.
+  // From this x on a bound exp(-x) on a test's probability is low enough.
   double LeastExponent() const {
     return std::log(static_cast<double>(model_.images.size()) /
                     options_.false_alarm);
@@ -266,9 +282,9 @@ class Checker {
 
   // The share of the image's 2D points that are in tracks.
   double KeptShare(size_t n) const {
+    const auto num = static_cast<double>(model_.images[n].points2D.size());
     return static_cast<double>(check_.images[n].num_observations) /
-           static_cast<double>(
-               std::max<size_t>(1, model_.images[n].points2D.size()));
+           std::max(1.0, num);
   }
 
   // Below 1 if that share is less than a third of the median image's.
@@ -291,10 +307,6 @@ class Checker {
     check_.sigma_px = snooping_.noise.sigma_px;
     check_.cauchy_scale_px = snooping_.noise.cauchy_scale_px;
     check_.critical_w = snooping_.noise.critical_w;
-    for (size_t n = 0; n < check_.images.size(); ++n) {
-      if (IsWrong(static_cast<int32_t>(n))) continue;
-      check_.num_tested += check_.images[n].num_tested;
-    }
     std::vector<Point3DId> point_of;
     for (const Point3D& point : model_.points3D) {
       point_of.insert(point_of.end(), point.track_end - point.track_begin,
@@ -317,9 +329,7 @@ class Checker {
     options.sigma_px = check_.sigma_px;
     options.is_left_out.assign(image_of_.size(), 1);
     for (const WrongObservation& one : check_.observations) {
-      if (!one.is_of_two && std::isfinite(one.w)) {
-        options.is_left_out[one.element] = 0;
-      }
+      options.is_left_out[one.element] = one.is_of_two || !std::isfinite(one.w);
     }
     const ModelNoise others = SnoopNoise(model_, options, context_).noise;
     for (size_t k = 0; k < model_.points3D.size(); ++k) {
@@ -340,6 +350,7 @@ class Checker {
     for (size_t n = 0; n < sums_.size(); ++n) {
       ImageCheck& image = check_.images[n];
       if (IsWrong(static_cast<int32_t>(n))) continue;
+      check_.num_tested += image.num_tested;
       image.turn_deg = kDegreesPerRadian * sums_[n].step.head<3>().norm();
       image.shift = sums_[n].step.tail<3>().norm();
       image.center_sigma = *check_.sigma_px * sums_[n].CenterSpread();

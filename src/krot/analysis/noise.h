@@ -165,6 +165,12 @@ struct ImageSums {
   }
 };
 
+// The general form of ImageSums::GainExponent: by freeing so many parameters
+// the sum of squares `square`, over so many directions, falls by `gain`. An odd
+// number of parameters is rounded up.
+double GainExponent(double gain, double square, int64_t num_directions,
+                    int num_parameters, double sigma_px);
+
 // An image's squared errors up to a limit, as shares u of the limit's square.
 // Gaussian noise of sigma gives u the density lambda exp(-lambda u) / (1 -
 // exp(-lambda)) with lambda = limit^2 / (2 sigma^2), whatever was filtered out

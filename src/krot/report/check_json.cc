@@ -1,3 +1,4 @@
+#include "krot/report/camera_report.h"
 #include "krot/report/pair_report.h"
 #include "krot/report/part_report.h"
 #include "krot/report/report_json.h"
@@ -165,6 +166,7 @@ std::string CheckJson(const CheckReport& report) {
         {"after", ErrorJson(report.pixel_error_after)}}},
       {"database", check.pairs ? PairJson(*check.pairs) : Json()},
       {"moved_images", report.moved},
+      {"cameras", CamerasJson(check)},
       {"images", images},
       {"observations", observations},
       {"tracks", tracks},

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "krot/base/numbers.h"
+#include "krot/report/camera_report.h"
 #include "krot/report/pair_report.h"
 #include "krot/report/part_report.h"
 #include "krot/report/text_table.h"
@@ -116,11 +117,12 @@ std::string TrackTable(const ModelCheck& check, size_t max_rows) {
          "\n" + table.ToString();
 }
 
-std::string RobustAdjustment(const std::string& model, double scale_px) {
+std::string RobustAdjustment(const std::string& model, double scale_px,
+                             const std::string& more = "") {
   return "    krot bundle_adjuster --input_path " + model +
          " --output_path ADJUSTED --BundleAdjustmentCeres.loss_function_type "
          "CAUCHY --BundleAdjustmentCeres.loss_function_scale " +
-         FormatLength(scale_px) + "\n";
+         FormatLength(scale_px) + more + "\n";
 }
 
 // Suggests what to do next, in commands of COLMAP and KROT.
@@ -140,12 +142,20 @@ std::string NextSteps(const CheckReport& report) {
   const std::string database = or_name(report.database_path, "DATABASE");
   std::string text = "\nNext\n";
   if (!check.is_adjusted) {
+    const bool is_center_held =
+        std::any_of(check.cameras.begin(), check.cameras.end(),
+                    [](const WrongCamera& camera) {
+                      return camera.fault == CameraFault::kPrincipalPoint;
+                    });
     return text +
            "  Adjust the model with a loss that wrong observations do not bend "
            "(colmap bundle_adjuster of\n  COLMAP 4 has these options, too), "
            "and "
            "check it again:\n" +
-           RobustAdjustment(input, check.cauchy_scale_px.value_or(1)) +
+           RobustAdjustment(input, check.cauchy_scale_px.value_or(1),
+                            is_center_held
+                                ? " --BundleAdjustment.refine_principal_point 1"
+                                : "") +
            "    krot model_checker --input_path ADJUSTED\n";
   }
   std::string model = check.IsAnythingWrong() ? cured : input;
@@ -180,10 +190,10 @@ std::string NextSteps(const CheckReport& report) {
         database + " --image_path IMAGES\n";
   }
   if (num_weak > 0 || !check.parts.empty()) {
-    text += "  More matches for " +
-            std::string(num_weak > 0 ? "the weakly held images" : "") +
-            (num_weak > 0 && !check.parts.empty() ? " and " : "") +
-            (check.parts.empty() ? "" : "between the parts") +
+    text += "  More matches" +
+            std::string(num_weak > 0 ? " for the weakly held images" : "") +
+            (num_weak > 0 && !check.parts.empty() ? " and" : "") +
+            (check.parts.empty() ? "" : " between the parts") +
             ", and their points:\n    "
             "colmap exhaustive_matcher --database_path " +
             database +
@@ -240,7 +250,7 @@ std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
 
 namespace {
 
-std::string ForAdjusted(const CheckReport& report) {
+std::string WhatIsWrong(const CheckReport& report) {
   const ModelCheck& check = report.check;
   if (!check.sigma_px && !check.pairs) {
     return "Nothing can be said: no observation is checked by another one.";
@@ -300,22 +310,37 @@ std::string ForAdjusted(const CheckReport& report) {
          (num_weak > 0 ? "; " + Counted(num_weak, "image") + Are(num_weak) +
                              "weakly held"
                        : "") +
-         (check.parts.empty()
-              ? "."
-              : "; but " + Counted(check.parts.size(), "part") +
-                    (check.parts.size() > 1 ? " are" : " is") + " loose.");
+         ".";
+}
+
+// Parts may be elsewhere as a whole, whatever else is wrong.
+std::string ForAdjusted(const CheckReport& report) {
+  std::string text = WhatIsWrong(report);
+  const std::vector<ModelPart>& parts = report.check.parts;
+  if (parts.empty()) return text;
+  text.pop_back();  // the full stop
+  return text + (report.check.IsAnythingWrong() ? "; and " : "; but ") +
+         Counted(parts.size(), "part") + (parts.size() > 1 ? " are" : " is") +
+         " loose.";
 }
 
 }  // namespace
 
 std::string CheckSentence(const CheckReport& report) {
-  if (report.check.is_adjusted) return ForAdjusted(report);
-  if (!report.check.IsAnythingWrong()) {
-    return "The model is not adjusted, so nothing can be said yet: adjust it, "
-           "and check it again.";
+  const ModelCheck& check = report.check;
+  if (check.is_adjusted) return ForAdjusted(report);
+  const bool is_camera = !check.cameras.empty();
+  const bool is_more = !check.observations.empty() ||
+                       check.NumImages(ImageVerdict::kWrong) > 0 ||
+                       (check.pairs && check.pairs->IsAnythingWrong());
+  if (!is_more) {
+    return is_camera ? CamerasSentence(check)
+                     : "The model is not adjusted, so nothing can be said yet: "
+                       "adjust it, and check it again.";
   }
-  return "The model is not adjusted, so adjust it first. As it stands: " +
-         ForAdjusted(report);
+  return (is_camera ? CamerasSentence(check)
+                    : "The model is not adjusted, so adjust it first.") +
+         " As it stands: " + ForAdjusted(report);
 }
 
 std::string CheckTable(const CheckReport& report, int max_rows) {
@@ -329,13 +354,14 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
       " fine. Observations that others check: " + Thousands(check.num_tested) +
       ".\n";
   if (!check.parts.empty()) text += PartsSentence(check) + "\n";
-  if (!check.is_adjusted) {
+  if (!check.is_adjusted && check.cameras.empty()) {
     text +=
         "Not adjusted: most images do not stand where their own errors would "
         "have them. That alone\nmakes observations and images look wrong.\n";
   }
   if (check.pairs) text += PairTable(*check.pairs, max_rows);
-  return text + ImageTable(check, ImageVerdict::kWrong, num_rows) +
+  return text + CameraTable(check, num_rows) +
+         ImageTable(check, ImageVerdict::kWrong, num_rows) +
          ImageTable(check, ImageVerdict::kWeaklyHeld, num_rows) +
          PartTable(check, num_rows) + ObservationTable(check, num_rows) +
          TrackTable(check, num_rows) + NextSteps(report) + "\n" +

@@ -1,0 +1,214 @@
+#include "krot/analysis/camera_check.h"
+
+#include <cmath>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include "krot/camera/camera_model.h"
+#include "krot/check.h"
+#include "krot/linear/small_matrices.h"
+#include "krot/model.h"
+#include "krot/model/rigs.h"
+#include "krot/synthetic/scene.h"
+
+namespace krot::internal {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+Model RigScene(int seed, int num_frames, int num_points, int num_sensors = 3) {
+  SceneOptions options;
+  options.num_frames = num_frames;
+  options.num_points = num_points;
+  options.track_length = 5;
+  options.pixel_noise = 1;
+  options.sensors_per_rig = num_sensors;
+  options.random_seed = static_cast<uint64_t>(seed);
+  return SynthesizeScene(options).ground_truth;
+}
+
+Pose Turned(const Pose& pose, const Vector3d& rotation, const Vector3d& shift) {
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(rotation.norm(), rotation.normalized())
+          .toRotationMatrix();
+  const Vector3d center = -pose.Rotation().transpose() * pose.translation;
+  const Eigen::Matrix3d R = turn * pose.Rotation();
+  return ToPose({R, -R * (center + shift)});
+}
+
+Pose& PlaceOf(Model* model, size_t sensor) {
+  return *model->rigs[0].sensors[sensor].sensor_from_rig;
+}
+
+TEST(FindWrongCameras, FindsNoneWhereThereIsNothingButNoise) {
+  for (int seed = 1; seed <= 20; ++seed) {
+    const Model model = RigScene(seed, 4 + seed, 600, 1 + seed % 4);
+    EXPECT_THAT(CheckModel(model, {}, {}).cameras, IsEmpty());
+  }
+}
+
+// Nor where noise differs by camera: its size is no fault.
+TEST(FindWrongCameras, FindsNoneWhereACameraIsNoisier) {
+  for (int seed = 1; seed <= 10; ++seed) {
+    Model model = RigScene(seed, 12, 600);
+    std::mt19937_64 generator(static_cast<uint64_t>(seed));
+    std::normal_distribution<double> more(0, std::sqrt(8));
+    for (Image& image : model.images) {
+      if (image.camera_id != model.cameras[1].id) continue;
+      for (Point2D& point : image.points2D) {
+        point.x += more(generator);
+        point.y += more(generator);
+      }
+    }
+    EXPECT_THAT(CheckModel(model, {}, {}).cameras, IsEmpty());
+  }
+}
+
+// All images of that camera look misplaced, and those of its neighbours.
+TEST(FindWrongCameras, FindsACameraThatIsTurnedInItsRig) {
+  for (const double degrees : {0.5, 2.0, 5.0}) {
+    Model model = RigScene(1, 12, 600);
+    Pose& place = PlaceOf(&model, 1);
+    const Vector3d turn =
+        degrees / 180 * std::acos(-1.0) * Vector3d(1, 2, -1).normalized();
+    place = Turned(place, turn, Vector3d::Zero());
+    const ModelCheck check = CheckModel(model, {}, {});
+    ASSERT_THAT(check.cameras, SizeIs(1)) << degrees;
+    EXPECT_EQ(check.cameras[0].camera_id,
+              model.rigs[0].sensors[1].sensor_id.id);
+    EXPECT_EQ(check.cameras[0].fault, CameraFault::kPlaceInRig);
+    EXPECT_EQ(check.cameras[0].num_images, 12);
+    EXPECT_NEAR(check.cameras[0].turn_deg, degrees, 0.05 * degrees);
+    EXPECT_EQ(check.NumImages(ImageVerdict::kWrong), 0);
+    EXPECT_FALSE(check.is_adjusted);
+    EXPECT_TRUE(check.IsAnythingWrong());
+  }
+}
+
+TEST(FindWrongCameras, FindsTheDistortionOfOneOfTwoCameras) {
+  Model model = RigScene(1, 20, 1000, 2);
+  model.cameras[1].params[3] += 0.1;
+  const ModelCheck check = CheckModel(model, {}, {});
+  ASSERT_THAT(check.cameras, SizeIs(1));
+  EXPECT_EQ(check.cameras[0].camera_id, model.cameras[1].id);
+  EXPECT_EQ(check.cameras[0].fault, CameraFault::kDistortion);
+}
+
+// The errors of a model after small steps: three numbers each by which frames
+// turn and move, the same of the second camera's place, and three of each
+// point.
+class Linearized {
+ public:
+  Linearized(const Model& model, const std::vector<Vector3d>& points)
+      : model_(model), image_of_(ImagesOfElements(model)) {
+    for (size_t k = 0; k < points.size(); ++k)
+      model_.points3D[k].xyz = points[k];
+  }
+
+  VectorXd Errors() const {
+    const std::vector<ImageGeometry> geometries = ImageGeometries(model_);
+    VectorXd errors(2 * model_.track_elements.size());
+    for (const Point3D& point : model_.points3D) {
+      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+        const ImageGeometry& geometry = geometries[image_of_[e]];
+        const Point2D& pixel =
+            model_.images[image_of_[e]]
+                .points2D[model_.track_elements[e].point2D_idx];
+        errors.segment<2>(static_cast<Eigen::Index>(2 * e)) = *ProjectionError(
+            model_.cameras[geometry.camera], {pixel.x, pixel.y},
+            geometry.cam_from_world * point.xyz);
+      }
+    }
+    return errors;
+  }
+
+  // By how much the sum of squares falls, to first order, if all poses and
+  // points are free, with or without the camera's place.
+  double Fall(bool frees_place) {
+    std::vector<VectorXd> columns;
+    const auto add = [&](const std::function<void(double)>& step) {
+      const Model kept = model_;
+      step(1e-5);
+      const VectorXd above = Errors();
+      model_ = kept;
+      step(-1e-5);
+      columns.push_back((above - Errors()) / 2e-5);
+      model_ = kept;
+    };
+    const auto add_pose = [&](const std::function<Pose&()>& pose) {
+      for (int i = 0; i < 3; ++i) {
+        const Vector3d axis = Vector3d::Unit(i);
+        add([&](double h) {
+          pose() = Turned(pose(), h * axis, Vector3d::Zero());
+        });
+        add([&](double h) { pose() = Turned(pose(), {0, 0, 0}, h * axis); });
+      }
+    };
+    for (Frame& frame : model_.frames) {
+      const auto n = &frame - model_.frames.data();
+      add_pose(
+          [this, n]() -> Pose& { return model_.frames[n].rig_from_world; });
+    }
+    if (frees_place) {
+      add_pose([this]() -> Pose& { return PlaceOf(&model_, 1); });
+    }
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      for (int i = 0; i < 3; ++i) {
+        add([&](double h) { model_.points3D[k].xyz[i] += h; });
+      }
+    }
+    const VectorXd errors = Errors();
+    MatrixXd J(errors.size(), static_cast<Eigen::Index>(columns.size()));
+    for (size_t c = 0; c < columns.size(); ++c) {
+      J.col(static_cast<Eigen::Index>(c)) = columns[c].normalized();
+    }
+    const Eigenpairs of_JJ = EigenpairsOf(J.transpose() * J);
+    const VectorXd along = of_JJ.vectors.transpose() * (J.transpose() * errors);
+    double fall = 0;
+    for (Eigen::Index j = 0; j < J.cols(); ++j) {
+      if (of_JJ.values[j] < 1e-10) continue;  // a motion of everything
+      fall += along[j] * along[j] / of_JJ.values[j];
+    }
+    return fall;
+  }
+
+ private:
+  Model model_;
+  const std::vector<int32_t> image_of_;
+};
+
+TEST(FindWrongCameras, GainsWhatFreeingTheCameraTakesFromTheSumOfSquares) {
+  Model model = RigScene(2, 5, 60);
+  Pose& place = PlaceOf(&model, 1);
+  place = Turned(place, {0.02, 0.01, -0.01}, {0.001, 0, 0});
+  NoiseOptions options;
+  const ModelNoise noise = EstimateNoise(model, options, {});
+  ASSERT_EQ(noise.num_tested,
+            static_cast<int64_t>(model.track_elements.size()));
+  const std::vector<ImageSums> sums = AddUpImages(model, noise);
+  const std::vector<WrongCamera> wrong =
+      FindWrongCameras(model, noise, sums, 1, 0.05, 1);
+  ASSERT_THAT(wrong, SizeIs(1));
+  ASSERT_EQ(wrong[0].fault, CameraFault::kPlaceInRig);
+  double square = 0;
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  for (size_t n = 0; n < sums.size(); ++n) {
+    if (geometries[n].sensor == 1) square += sums[n].square;
+  }
+  Linearized linearized(model, noise.points);
+  const double fall = linearized.Fall(true) - linearized.Fall(false);
+  EXPECT_LT(fall, square);
+  EXPECT_NEAR(wrong[0].gain, fall / square, 1e-4);
+}
+
+}  // namespace
+}  // namespace krot::internal
