@@ -1,5 +1,4 @@
 #include "krot/report/pair_report.h"
-#include "krot/report/part_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/reports.h"
 
