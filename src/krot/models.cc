@@ -65,27 +65,15 @@ SolveModelOptions PipelineOptions(const SolveOptions& options) {
 }
 
 SolveResult Described(SolveModelResult solved) {
-  SolveSummary& summary = solved.summary;
+  const SolveSummary& summary = solved.summary;
   SolveResult result;
+  static_cast<SolveFindings&>(result) = summary;
   result.model = std::move(solved.model);
-  result.termination = summary.termination;
-  result.method = summary.method;
   result.max_error = summary.cost_final;
   result.lowest_max_error = summary.LowestCost();
-  result.lower_bound = summary.lower_bound;
-  result.relative_gap = summary.relative_gap;
   result.errors_before = summary.pixel_error_before;
   result.errors_after = summary.pixel_error_after;
-  result.support = std::move(summary.support);
-  result.support_positions = std::move(summary.support_positions);
-  result.num_images = summary.num_images;
-  result.num_points = summary.num_points;
-  result.num_observations = summary.num_observations;
-  result.num_components = summary.num_components;
-  result.left_out = summary.left_out;
-  result.loose_images = std::move(summary.loose.images);
-  result.is_given_back = summary.is_given_back;
-  result.is_underdetermined = summary.is_underdetermined;
+  result.loose_images = summary.loose.images;
   if (summary.certificate) {
     result.certificate = CertificateJson(*summary.certificate);
   }
@@ -110,14 +98,10 @@ AdjustResult Adjust(const Model& model, const AdjustOptions& options,
   pipeline.adjustment = options.adjustment;
   pipeline.max_error_factor = options.max_error_factor;
   AdjustModelResult adjusted = AdjustModel(model, pipeline, context);
-  AdjustResult result;
-  result.model = std::move(adjusted.model);
-  result.summary = std::move(adjusted.summary.adjustment);
-  result.max_error = adjusted.summary.max_error;
-  result.errors_before = adjusted.summary.pixel_error_before;
-  result.errors_start = adjusted.summary.pixel_error_start;
-  result.errors_after = adjusted.summary.pixel_error_after;
-  return result;
+  AdjustModelSummary& summary = adjusted.summary;
+  return {std::move(adjusted.model), std::move(summary.adjustment),
+          summary.max_error,         summary.pixel_error_before,
+          summary.pixel_error_start, summary.pixel_error_after};
 }
 
 OutlierResult RemoveOutliers(const Model& model, const OutlierOptions& options,
@@ -129,24 +113,12 @@ OutlierResult RemoveOutliers(const Model& model, const OutlierOptions& options,
   pipeline.make_profile = options.make_profile;
   pipeline.solve = PipelineOptions(options.solve);
   OutlierFilterResult filtered = FilterOutliers(model, pipeline, context);
-  OutlierFilterSummary& summary = filtered.summary;
+  const OutlierFilterSummary& summary = filtered.summary;
   OutlierResult result;
+  static_cast<OutlierFindings&>(result) = summary;
   result.model = std::move(filtered.model);
-  result.max_error = summary.max_error;
-  result.removed = std::move(summary.removed);
-  result.num_proved = summary.num_proved;
-  result.is_search_complete = summary.is_search_complete;
-  result.is_within = summary.is_within;
-  result.num_left_alone = summary.num_left_alone;
-  result.num_points_removed = summary.num_points_removed;
   result.errors_before = summary.pixel_error_before;
   result.errors_after = summary.pixel_error_after;
-  result.tracks = std::move(summary.tracks);
-  result.images = std::move(summary.images);
-  result.cameras = std::move(summary.cameras);
-  result.rotation_suspect = std::move(summary.rotation_suspect);
-  result.weak_parts = std::move(summary.weak_parts);
-  result.profile = std::move(summary.profile);
   if (summary.solve) {
     result.termination = summary.solve->termination;
     result.lower_bound = summary.solve->lower_bound;
@@ -159,21 +131,16 @@ TolerancesResult FindTolerances(const Model& model,
                                 const TolerancesOptions& options,
                                 const Context& context) {
   ToleranceOptions pipeline;
-  pipeline.max_error = options.max_error;
-  pipeline.tolerance = options.tolerance;
-  pipeline.images = options.images;
-  pipeline.points = options.points;
-  pipeline.gauge_images = options.gauge_images;
+  static_cast<ToleranceRequest&>(pipeline) = options;
   pipeline.solve = PipelineOptions(options.solve);
   ToleranceResult found = AnalyzeTolerances(model, pipeline, context);
-  TolerancesResult result;
-  result.model = std::move(found.model);
-  result.termination = found.summary.termination;
-  result.max_error = found.summary.cost;
-  result.lower_bound = found.summary.lower_bound;
-  result.gauge_images = std::move(found.summary.gauge_images);
-  result.boxes = std::move(found.summary.boxes);
-  return result;
+  ToleranceSummary& summary = found.summary;
+  return {std::move(found.model),
+          summary.termination,
+          summary.cost,
+          summary.lower_bound,
+          std::move(summary.gauge_images),
+          std::move(summary.boxes)};
 }
 
 CertificateVerdict VerifyCertificate(const Model& model,

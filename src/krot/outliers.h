@@ -116,24 +116,28 @@ struct OutlierOptions {
   SolveOptions solve;  // of the remaining observations; nothing may be fixed
 };
 
-struct OutlierResult {
-  Model model;           // without what was removed, solved
+// What was removed, and where such observations accumulate.
+struct OutlierFindings {
   double max_error = 0;  // the bound, true pixels; 0: noise explains all
   // The number of observations that must go is in [num_proved, removed.size()].
   std::vector<RemovedObservation> removed;  // largest error first
   int64_t num_proved = 0;  // conflicts that share no observation
   // Whether the search for conflicts ended because there are no more.
   bool is_search_complete = true;
-  bool is_within = false;      // all errors of `model` are within the bound
+  bool is_within = false;      // all errors of the result are within the bound
   int64_t num_left_alone = 0;  // they fit, but their tracks became too short
   int64_t num_points_removed = 0;  // because their tracks became too short
-  PixelErrorStatistics errors_before;
-  PixelErrorStatistics errors_after;
-  // Where removed observations accumulate, most first.
+  // Those with removed observations, most of them first.
   std::vector<Suspect> tracks, images, cameras;
   std::optional<RotationSuspect> rotation_suspect;
-  std::vector<WeakPart> weak_parts;
+  std::vector<WeakPart> weak_parts;  // from nothing
   std::optional<ErrorProfileSummary> profile;
+};
+
+struct OutlierResult : OutlierFindings {
+  Model model;  // without what was removed, solved
+  PixelErrorStatistics errors_before;
+  PixelErrorStatistics errors_after;
   // Of the last solve, of the remaining observations; none if nothing remains.
   std::optional<SolveTermination> termination;
   std::optional<double> lower_bound;  // true pixels

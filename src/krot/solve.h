@@ -149,22 +149,16 @@ struct SolveOptions {
   std::function<void(const SolveState&)> on_progress;
 };
 
-struct SolveResult {
-  Model model;  // a copy of the input if nothing better was found
+// What took part in a solve, and what was proved.
+struct SolveFindings {
   SolveTermination termination = SolveTermination::kNotRun;
   SolveMethod method = SolveMethod::kAuto;  // that was used
 
-  // Of the observations that took part, true pixels: the largest error of the
-  // result; the lowest value that it reached, before the finish; and a proved
-  // bound, which no translations and points can be below with these rotations.
-  double max_error = 0;
-  double lowest_max_error = 0;
+  // A proved bound, which no translations and points can be below with these
+  // rotations; true pixels.
   std::optional<double> lower_bound;
-  std::optional<double> relative_gap;  // (max_error - lower_bound) / max_error
-
-  // Over all observations of the model.
-  PixelErrorStatistics errors_before;
-  PixelErrorStatistics errors_after;
+  // (max - lower_bound) / max, with the largest error of the result.
+  std::optional<double> relative_gap;
 
   // The certificate's support, which sets the maximum: without it the maximum
   // could be lower.
@@ -178,10 +172,23 @@ struct SolveResult {
   int32_t num_components = 0;
   // Counts of observations that did not, by LeftOut.
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
-  std::vector<LooseImage> loose_images;
   bool is_given_back = false;  // nothing better than the input was found
-  // Too few observations: an error of zero says nothing.
+  // No more equations (two per observation) than unknowns: an error of zero
+  // says nothing.
   bool is_underdetermined = false;
+};
+
+struct SolveResult : SolveFindings {
+  Model model;  // a copy of the input if nothing better was found
+
+  // Of the observations that took part, true pixels: the largest error of the
+  // result, and the lowest value that it reached, before the finish.
+  double max_error = 0;
+  double lowest_max_error = 0;
+  // Over all observations of the model.
+  PixelErrorStatistics errors_before;
+  PixelErrorStatistics errors_after;
+  std::vector<LooseImage> loose_images;
 
   // The proof of lower_bound, if it was asked for and exists: JSON that
   // krot/certificate.h and `krot certificate_checker` check.

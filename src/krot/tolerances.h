@@ -51,7 +51,8 @@ struct ToleranceBox {
   PositionBox box;
 };
 
-struct TolerancesOptions {
+// Which boxes are asked for.
+struct ToleranceRequest {
   double max_error = 0;  // the bound, pixels; > 0
   // How far the reached end may be from the proved one, relative to the proved
   // end's distance from the position; > 0.
@@ -59,10 +60,12 @@ struct TolerancesOptions {
   // Indices in Model::images and Model::points3D: the boxes to find.
   std::vector<int32_t> images;
   std::vector<int32_t> points;
-  // The indices of two images that hold place and scale. Empty: the parts
-  // marked in solve.fixed hold them or, if there are none, two images are
-  // chosen.
+  // The indices of two images that hold place and scale. Empty: the parts that
+  // the options fix hold them or, if there are none, two images are chosen.
   std::vector<int32_t> gauge_images;
+};
+
+struct TolerancesOptions : ToleranceRequest {
   // For the solve that finds an estimate within the bound, if the model itself
   // is not within it.
   SolveOptions solve;

@@ -10,6 +10,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/multiplier_oracle.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -18,11 +19,7 @@ const Context kOneThread{1};
 
 // The lowest maximum of a noisy scene, where least squares cannot stay.
 Model NoisyScene(int sensors_per_rig = 1) {
-  SceneOptions options;
-  options.num_frames = 8;
-  options.num_points = 80;
-  options.track_length = 5;
-  options.pixel_noise = 1;
+  SceneOptions options = SceneOf(8, 80, 5, 1);
   options.sensors_per_rig = sensors_per_rig;
   options.random_seed = 9;
   return SolveModel(SynthesizeScene(options).model, {}).model;

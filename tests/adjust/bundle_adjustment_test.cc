@@ -21,6 +21,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -29,11 +30,7 @@ namespace {
 const Context kAdjustAlone{1};
 
 SceneOptions SmallOptions() {
-  SceneOptions options;
-  options.num_frames = 8;
-  options.num_points = 80;
-  options.track_length = 5;
-  options.pixel_noise = 0.5;
+  SceneOptions options = SceneOf(8, 80, 5, 0.5);
   options.start_translation_noise = 0.003;
   options.start_point_noise = 0.003;
   options.rotation_noise_deg = 0.05;

@@ -7,6 +7,7 @@
 #include "krot/model.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 // What lower_max_error ends at is compared with what is known of the same
 // scene: the certified optimum with rotations fixed, bounded adjustments, and
@@ -18,11 +19,7 @@ namespace {
 const Context kLowerAlone{1};
 
 SceneOptions NoisyOptions() {
-  SceneOptions options;
-  options.num_frames = 8;
-  options.num_points = 80;
-  options.track_length = 5;
-  options.pixel_noise = 1;
+  SceneOptions options = SceneOf(8, 80, 5, 1);
   options.random_seed = 9;
   return options;
 }

@@ -14,6 +14,7 @@
 #include "krot/pipeline/adjust_model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/dense_algebra.h"
+#include "tests/testing/scene_of.h"
 
 // The oracle knows no derivative, eliminates nothing and has no formula of a
 // gauge: central differences of all errors, and of what the datum holds, by all
@@ -32,13 +33,9 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 Model PreciseScene(int camera_model_id, int sensors_per_rig = 2) {
-  SceneOptions options;
-  options.num_frames = 4;
-  options.num_points = 25;
-  options.track_length = sensors_per_rig == 1 ? 3.5 : 5;
+  SceneOptions options = SceneOf(4, 25, sensors_per_rig == 1 ? 3.5 : 5, 1);
   options.camera_model_id = camera_model_id;
   options.sensors_per_rig = sensors_per_rig;
-  options.pixel_noise = 1;
   options.random_seed = 5;
   return SynthesizeScene(options).ground_truth;
 }
@@ -570,11 +567,7 @@ TEST(Precision, CoversTheTruthAsOftenAsItSays) {
   int focals_within = 0;
   double squares = 0, redundancy = 0;
   for (int seed = 0; seed < kScenes; ++seed) {
-    SceneOptions scene;
-    scene.num_frames = 6;
-    scene.num_points = 60;
-    scene.track_length = 4;
-    scene.pixel_noise = kNoise;
+    SceneOptions scene = SceneOf(6, 60, 4, kNoise);
     scene.random_seed = seed;
     const Model truth = SynthesizeScene(scene).ground_truth;
     BundleAdjustmentOptions options;
@@ -631,11 +624,7 @@ TEST(Precision, CoversTheTruthAsOftenAsItSays) {
 
 // Noise of 0.7 px, and a start that is off.
 SyntheticScene NoisyScene(int num_frames, int num_points, int seed) {
-  SceneOptions options;
-  options.num_frames = num_frames;
-  options.num_points = num_points;
-  options.track_length = 5;
-  options.pixel_noise = 0.7;
+  SceneOptions options = SceneOf(num_frames, num_points, 5, 0.7);
   options.start_translation_noise = 0.002;
   options.start_point_noise = 0.002;
   options.random_seed = seed;

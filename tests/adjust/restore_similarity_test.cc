@@ -7,6 +7,7 @@
 
 #include "krot/model.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -32,11 +33,8 @@ void Move(double scale, const Matrix3d& rotation, const Vector3d& shift,
 }
 
 Model Scene(int sensors_per_rig) {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 50;
+  SceneOptions options = SceneOf(6, 50, 6, 1);
   options.sensors_per_rig = sensors_per_rig;
-  options.pixel_noise = 1;
   return SynthesizeScene(options).model;
 }
 

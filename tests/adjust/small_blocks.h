@@ -5,19 +5,16 @@
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/model.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 
 // A noisy scene of two sensors per rig: the blocks of its start, and a cap
 // somewhat above their largest error.
 inline AdjustmentBlocks SmallBlocks(int camera_model_id, uint64_t seed = 3) {
-  SceneOptions options;
-  options.num_frames = 4;
-  options.num_points = 12;
-  options.track_length = 5;
+  SceneOptions options = SceneOf(4, 12, 5, 1);
   options.camera_model_id = camera_model_id;
   options.sensors_per_rig = 2;
-  options.pixel_noise = 1;
   options.start_point_noise = 1e-3;
   options.random_seed = seed;
   const Model model = SynthesizeScene(options).model;

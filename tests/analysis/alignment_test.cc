@@ -14,6 +14,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -188,11 +189,8 @@ TEST(AlignFrames, IsThatOfTheOthersWhereACameraRunsAway) {
 }
 
 SceneOptions RigScene() {
-  SceneOptions options;
-  options.num_frames = 5;
-  options.num_points = 50;
+  SceneOptions options = SceneOf(5, 50, 6, 1);
   options.sensors_per_rig = 2;
-  options.pixel_noise = 1;
   return options;
 }
 

@@ -5,6 +5,7 @@
 
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -13,9 +14,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 SyntheticScene CollapsingScene() {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 60;
+  SceneOptions options = SceneOf(6, 60);
   options.start_point_noise = 0.01;
   return SynthesizeScene(options);
 }

@@ -11,6 +11,7 @@
 #include "krot/model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -70,11 +71,7 @@ TEST(ColorPointsByError, IsGreyWhereNoErrorIsFinite) {
 }
 
 TEST(ColorPointsByError, ChangesNothingButColors) {
-  SceneOptions options;
-  options.num_frames = 4;
-  options.num_points = 30;
-  options.track_length = 3;
-  options.pixel_noise = 1;
+  SceneOptions options = SceneOf(4, 30, 3, 1);
   const Model scene = SynthesizeScene(options).model;
   Model model = scene;
   ColorPointsByError(PixelErrors(model), 4, &model);

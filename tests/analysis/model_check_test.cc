@@ -20,6 +20,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/dense_algebra.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -29,11 +30,7 @@ using ::testing::IsEmpty;
 
 Model Scene(int seed, int num_frames = 12, double track_length = 4,
             double pixel_noise = 1) {
-  SceneOptions options;
-  options.num_frames = num_frames;
-  options.num_points = 600;
-  options.track_length = track_length;
-  options.pixel_noise = pixel_noise;
+  SceneOptions options = SceneOf(num_frames, 600, track_length, pixel_noise);
   options.random_seed = static_cast<uint64_t>(seed);
   return SynthesizeScene(options).ground_truth;
 }
@@ -507,11 +504,7 @@ Model WithTracksForAllOf(size_t image, Model model) {
 // Less than half of them contradict, but more than three times the noise would
 // have, and what agrees does not hold the image, whether it lost tracks or not.
 TEST(CheckModel, CallsAnImageWrongThatIsWeaklyHeldAndContradicted) {
-  SceneOptions options;
-  options.num_frames = 10;
-  options.num_points = 6000;
-  options.track_length = 5;
-  options.pixel_noise = 1;
+  SceneOptions options = SceneOf(10, 6000, 5, 1);
   const Model scene = SynthesizeScene(options).ground_truth;
   for (const int percent : {0, 10, 45}) {
     for (const bool keeps_few : {true, false}) {

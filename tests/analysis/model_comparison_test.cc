@@ -12,6 +12,7 @@
 #include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -19,11 +20,8 @@ namespace {
 using Eigen::Vector3d;
 
 SceneOptions NoisyScene() {
-  SceneOptions options;
-  options.num_frames = 7;
-  options.num_points = 80;
+  SceneOptions options = SceneOf(7, 80, 6, 0.5);
   options.has_rigs = false;
-  options.pixel_noise = 0.5;
   return options;
 }
 

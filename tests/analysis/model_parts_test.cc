@@ -16,6 +16,7 @@
 #include "krot/model/derived_models.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -26,11 +27,7 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 Model TwentyFrames(int seed, int sensors_per_rig = 1) {
-  SceneOptions options;
-  options.num_frames = 20;
-  options.num_points = 800;
-  options.track_length = 5;
-  options.pixel_noise = 1;
+  SceneOptions options = SceneOf(20, 800, 5, 1);
   options.sensors_per_rig = sensors_per_rig;
   options.random_seed = static_cast<uint64_t>(seed);
   return SynthesizeScene(options).ground_truth;

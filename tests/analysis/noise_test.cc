@@ -12,6 +12,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/dense_algebra.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -20,11 +21,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 SceneOptions SmallScene(int seed) {
-  SceneOptions options;
-  options.num_frames = 10;
-  options.num_points = 150;
-  options.track_length = 4;
-  options.pixel_noise = 1;
+  SceneOptions options = SceneOf(10, 150, 4, 1);
   options.random_seed = static_cast<uint64_t>(seed);
   return options;
 }

@@ -12,18 +12,15 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
 
 SceneOptions Scene(bool has_rigs) {
-  SceneOptions options;
-  options.num_frames = 4;
-  options.num_points = 40;
-  options.track_length = 3;
+  SceneOptions options = SceneOf(4, 40, 3, 0.5);
   options.has_rigs = has_rigs;
   options.sensors_per_rig = has_rigs ? 2 : 1;
-  options.pixel_noise = 0.5;
   return options;
 }
 

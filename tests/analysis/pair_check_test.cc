@@ -17,6 +17,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -113,11 +114,7 @@ TEST(ExplainContradictions, ThatEndsEarlyIsAnExplanationAndSaysSo) {
 
 // Exact poses, noise of half a pixel, cameras with a lens.
 Model Scene() {
-  SceneOptions options;
-  options.num_frames = 12;
-  options.num_points = 1500;
-  options.track_length = 6;
-  options.pixel_noise = 0.5;
+  SceneOptions options = SceneOf(12, 1500, 6, 0.5);
   options.random_seed = 3;
   return SynthesizeScene(options).ground_truth;
 }

@@ -10,16 +10,12 @@
 #include "krot/camera/camera_model.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
 
-SceneOptions SmallScene() {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 100;
-  return options;
-}
+SceneOptions SmallScene() { return SceneOf(6, 100); }
 
 // Two images one unit apart along x look along z at a point 10 away; camera
 // f = 100, centre (50, 40).

@@ -13,6 +13,7 @@
 #include "krot/context.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -25,9 +26,7 @@ using ::testing::HasSubstr;
 class Town {
  public:
   Town(int num_cameras, unsigned seed) : random_(seed) {
-    SceneOptions options;
-    options.num_frames = num_cameras;
-    options.num_points = 60;
+    SceneOptions options = SceneOf(num_cameras, 60);
     options.has_rigs = false;
     options.start_translation_noise = 1e-4;
     options.start_point_noise = 1e-4;

@@ -9,6 +9,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -16,10 +17,7 @@ namespace {
 using ::testing::HasSubstr;
 
 Model RotatedScene() {
-  SceneOptions options;
-  options.num_frames = 8;
-  options.num_points = 60;
-  options.pixel_noise = 0.5;
+  SceneOptions options = SceneOf(8, 60, 6, 0.5);
   options.has_rigs = false;
   return SynthesizeScene(options).model;
 }

@@ -9,16 +9,13 @@
 #include "krot/model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
 
 Model ContradictoryScene() {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 60;
-  options.pixel_noise = 0.5;
-  return SynthesizeScene(options).ground_truth;
+  return SynthesizeScene(SceneOf(6, 60, 6, 0.5)).ground_truth;
 }
 
 Image& ImageOf(Model* model, ImageId id) {

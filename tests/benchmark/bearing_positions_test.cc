@@ -9,14 +9,13 @@
 #include "krot/analysis/model_comparison.h"
 #include "krot/convert/build_problem.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
 
 TEST(PositionByBearings, FindsTheCamerasOfASceneWithoutNoise) {
-  SceneOptions options;
-  options.num_frames = 10;
-  options.num_points = 300;
+  SceneOptions options = SceneOf(10, 300);
   options.camera_model_id = 1;
   const Model truth = SynthesizeScene(options).ground_truth;
   const BuiltProblem built = BuildProblem(truth, {});

@@ -12,6 +12,7 @@
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -24,10 +25,7 @@ using Json = nlohmann::json;
 class DatabaseOption : public ::testing::Test {
  protected:
   DatabaseOption() {
-    SceneOptions options;
-    options.num_frames = 8;
-    options.num_points = 600;
-    options.pixel_noise = 0.5;
+    SceneOptions options = SceneOf(8, 600, 6, 0.5);
     Model model = SynthesizeScene(options).ground_truth;
     Save(model, folder_ / "sound");
     WriteDatabase(folder_ / "database.db", model, DatabaseOf(model));

@@ -13,6 +13,7 @@
 #include "krot/model/rigs.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -25,10 +26,7 @@ using Json = nlohmann::json;
 class ModelCheckerCommand : public ::testing::Test {
  protected:
   ModelCheckerCommand() {
-    SceneOptions options;
-    options.num_frames = 8;
-    options.num_points = 400;
-    options.pixel_noise = 0.5;
+    SceneOptions options = SceneOf(8, 400, 6, 0.5);
     options.random_seed = 3;
     Model model = SynthesizeScene(options).ground_truth;
     Save(model, folder_ / "sound");

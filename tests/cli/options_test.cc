@@ -370,18 +370,13 @@ TEST_F(Options, InAProjectFileMayComeFromWindows) {
 }
 
 TEST_F(Options, OfColmapsAdjusterAreTakenWhereTheyChangeNothing) {
-  const Words without_effect = {"use_gpu",
-                                "0",
-                                "gpu_index",
-                                "-1",
-                                "min_num_images_gpu_solver",
-                                "50",
-                                "min_num_residuals_for_cpu_multi_threading",
-                                "50000",
-                                "max_num_images_direct_dense_gpu_solver",
-                                "200",
-                                "max_num_images_direct_sparse_gpu_solver",
-                                "4000"};
+  const std::vector<Words> without_effect = {
+      {"use_gpu", "0"},
+      {"gpu_index", "-1"},
+      {"min_num_images_gpu_solver", "50"},
+      {"min_num_residuals_for_cpu_multi_threading", "50000"},
+      {"max_num_images_direct_dense_gpu_solver", "200"},
+      {"max_num_images_direct_sparse_gpu_solver", "4000"}};
   const Words adjust =
       Words{"bundle_adjuster", "--BundleAdjustmentCeres.num_threads", "1"} +
       Paths();
@@ -397,10 +392,9 @@ TEST_F(Options, OfColmapsAdjusterAreTakenWhereTheyChangeNothing) {
                  "1",
                  group + "max_num_images_direct_dense_cpu_solver",
                  "50"};
-    for (size_t n = 0; n < without_effect.size(); n += 2) {
-      all = all + Words{group + without_effect[n], without_effect[n + 1]};
-      EXPECT_THAT(help,
-                  ::testing::HasSubstr(group.substr(2) + without_effect[n]));
+    for (const Words& option : without_effect) {
+      all = all + Words{group + option[0], option[1]};
+      EXPECT_THAT(help, ::testing::HasSubstr(group.substr(2) + option[0]));
     }
     const KrotResult result = RunKrot(adjust + all);
     EXPECT_EQ(result.exit_code, 0) << result.err;

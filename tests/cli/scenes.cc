@@ -8,15 +8,12 @@
 #include "krot/base/numbers.h"
 #include "krot/convert/build_problem.h"
 #include "krot/model.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 
 SceneOptions SmallScene() {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 60;
-  options.track_length = 4;
-  options.pixel_noise = 0.5;
+  SceneOptions options = SceneOf(6, 60, 4, 0.5);
   options.start_translation_noise = 0.003;
   options.start_point_noise = 0.003;
   options.random_seed = 3;

@@ -11,6 +11,7 @@
 #include "krot/model/rigs.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
+#include "tests/testing/scene_of.h"
 
 // The commands on models that they can solve.
 
@@ -459,61 +460,25 @@ TEST_F(Commands, ModelAnalyzerTakesAModelWithoutPoints) {
 }
 
 TEST_F(Commands, ModelSynthesizerMakesWhatItsOptionsSay) {
-  const std::vector<std::string> arguments = {"model_synthesizer",
-                                              "--output_path",
-                                              folder_ / "start",
-                                              "--ground_truth_path",
-                                              folder_ / "truth",
-                                              "--output_type",
-                                              "TXT",
-                                              "--overwrite",
-                                              "1",
-                                              "--random_seed",
-                                              "5",
-                                              "--Scene.layout",
-                                              "street",
-                                              "--Scene.num_frames",
-                                              "7",
-                                              "--Scene.num_points",
-                                              "90",
-                                              "--Scene.track_length",
-                                              "3",
-                                              "--Scene.camera_model",
-                                              "OPENCV",
-                                              "--Scene.image_width",
-                                              "800",
-                                              "--Scene.image_height",
-                                              "600",
-                                              "--Scene.focal_length_factor",
-                                              "0.9",
-                                              "--Scene.has_rigs",
-                                              "1",
-                                              "--Scene.sensors_per_rig",
-                                              "2",
-                                              "--Scene.rig_baseline",
-                                              "0.05",
-                                              "--Scene.rig_rotation_deg",
-                                              "5",
-                                              "--Scene.pixel_noise",
-                                              "0.3",
-                                              "--Scene.outlier_ratio",
-                                              "0.02",
-                                              "--Scene.duplicate_ratio",
-                                              "0.01",
-                                              "--Scene.start_translation_noise",
-                                              "0.01",
-                                              "--Scene.start_point_noise",
-                                              "0.02",
-                                              "--Scene.rotation_noise_deg",
-                                              "0.1"};
+  std::vector<std::string> arguments = {
+      "model_synthesizer", "--output_path", folder_ / "start",
+      "--ground_truth_path", folder_ / "truth"};
+  std::istringstream words(
+      "--output_type TXT --overwrite 1 --random_seed 5 --Scene.layout street "
+      "--Scene.num_frames 7 --Scene.num_points 90 --Scene.track_length 3 "
+      "--Scene.camera_model OPENCV --Scene.image_width 800 "
+      "--Scene.image_height 600 --Scene.focal_length_factor 0.9 "
+      "--Scene.has_rigs 1 --Scene.sensors_per_rig 2 --Scene.rig_baseline 0.05 "
+      "--Scene.rig_rotation_deg 5 --Scene.pixel_noise 0.3 "
+      "--Scene.outlier_ratio 0.02 --Scene.duplicate_ratio 0.01 "
+      "--Scene.start_translation_noise 0.01 --Scene.start_point_noise 0.02 "
+      "--Scene.rotation_noise_deg 0.1");
+  for (std::string word; words >> word;) arguments.push_back(word);
   const KrotResult result = RunKrot(arguments);
   ASSERT_EQ(result.exit_code, 0) << result.err;
 
-  SceneOptions options;
+  SceneOptions options = SceneOf(7, 90, 3, 0.3);
   options.layout = SceneLayout::kStreet;
-  options.num_frames = 7;
-  options.num_points = 90;
-  options.track_length = 3;
   options.camera_model_id = 4;
   options.image_width = 800;
   options.image_height = 600;
@@ -521,7 +486,6 @@ TEST_F(Commands, ModelSynthesizerMakesWhatItsOptionsSay) {
   options.sensors_per_rig = 2;
   options.rig_baseline = 0.05;
   options.rig_rotation_deg = 5;
-  options.pixel_noise = 0.3;
   options.outlier_ratio = 0.02;
   options.duplicate_ratio = 0.01;
   options.start_translation_noise = 0.01;

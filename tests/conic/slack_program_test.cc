@@ -13,11 +13,7 @@ namespace krot::internal {
 namespace {
 
 RandomScene MakeSlackScene(unsigned seed, double baseline = 0) {
-  RandomSceneOptions options;
-  options.num_frames = 5;
-  options.num_points = 40;
-  options.views_per_frame = baseline > 0 ? 2 : 1;
-  options.baseline = baseline;
+  RandomSceneOptions options = {5, 40, baseline > 0 ? 2 : 1, baseline};
   options.seed = seed;
   return MakeRandomScene(options);
 }

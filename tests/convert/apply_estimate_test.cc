@@ -4,25 +4,23 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/convert/build_problem.h"
 #include "krot/camera/camera_model.h"
+#include "krot/convert/build_problem.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 #include "tests/convert/model_difference.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
 
 Model NoisyModel(int sensors_per_rig, bool has_rigs) {
-  SceneOptions options;
-  options.num_frames = 8;
-  options.num_points = 100;
+  SceneOptions options = SceneOf(8, 100, 6, 1);
   options.camera_model_id = FindCameraModel("PINHOLE")->id;
   options.sensors_per_rig = sensors_per_rig;
   options.has_rigs = has_rigs;
-  options.pixel_noise = 1;
   return SynthesizeScene(options).model;
 }
 

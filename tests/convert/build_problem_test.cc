@@ -10,16 +10,14 @@
 #include "krot/model.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
 
 SceneOptions SmallScene() {
-  SceneOptions options;
-  options.num_frames = 8;
-  options.num_points = 100;
+  SceneOptions options = SceneOf(8, 100, 6, 1);
   options.camera_model_id = FindCameraModel("PINHOLE")->id;
-  options.pixel_noise = 1;
   return options;
 }
 

@@ -16,6 +16,7 @@
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
 #include "tests/convert/pixel_optimum.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -24,12 +25,9 @@ using ::testing::HasSubstr;
 using Json = nlohmann::ordered_json;
 
 Model MakeModel(int sensors_per_rig, uint64_t seed = 1) {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 60;
+  SceneOptions options = SceneOf(6, 60, 6, 0.7);
   options.has_rigs = sensors_per_rig > 1;
   options.sensors_per_rig = sensors_per_rig;
-  options.pixel_noise = 0.7;
   options.random_seed = seed;
   return SynthesizeScene(options).model;
 }

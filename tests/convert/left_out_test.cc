@@ -7,11 +7,12 @@
 #include <limits>
 #include <string>
 
-#include "krot/convert/build_problem.h"
 #include "krot/camera/camera_model.h"
+#include "krot/convert/build_problem.h"
 #include "krot/model/rigs.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -20,10 +21,7 @@ using ::testing::ElementsAre;
 
 // Legacy, every point in all eight images of a distorting camera.
 Model EightImages(const char* camera_model = "SIMPLE_RADIAL") {
-  SceneOptions options;
-  options.num_frames = 8;
-  options.num_points = 50;
-  options.track_length = 8;
+  SceneOptions options = SceneOf(8, 50, 8);
   options.camera_model_id = FindCameraModel(camera_model)->id;
   options.has_rigs = false;
   return SynthesizeScene(options).model;
@@ -205,9 +203,7 @@ TEST(LeftOut, WhatRemainsOfATrackMayBeTooShort) {
 }
 
 TEST(LeftOut, AnImageOfNoFrameHasNoPose) {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 50;
+  SceneOptions options = SceneOf(6, 50);
   options.sensors_per_rig = 2;
   Model model = SynthesizeScene(options).model;
   const ImageId lost = static_cast<ImageId>(model.frames[1].data[0].data_id);

@@ -4,16 +4,14 @@
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
 
 // A fifth of the observations have a twin in their image.
 SyntheticScene SceneWithTwins() {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 50;
-  options.track_length = 4;
+  SceneOptions options = SceneOf(6, 50, 4);
   options.duplicate_ratio = 0.2;
   return SynthesizeScene(options);
 }

@@ -17,6 +17,7 @@
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 #include "tests/end_to_end/script.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -143,10 +144,7 @@ TEST_F(Scripts, ReadAPhotogrammetricProject) {
   if (std::system("/usr/bin/python3 -c 'import numpy' 2>/dev/null") != 0) {
     GTEST_SKIP() << "numpy is not installed";
   }
-  SceneOptions options;
-  options.num_frames = 5;
-  options.track_length = 4;
-  options.num_points = 50;
+  SceneOptions options = SceneOf(5, 50, 4);
   options.camera_model_id = 0;
   options.has_rigs = false;
   const Model scene = SynthesizeScene(options).ground_truth;

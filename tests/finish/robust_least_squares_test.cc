@@ -15,9 +15,7 @@ namespace {
 
 // Every tenth observation of a noisy scene is 50 pixels off.
 RandomScene SceneWithOutliers() {
-  RandomSceneOptions options;
-  options.num_frames = 8;
-  options.num_points = 60;
+  RandomSceneOptions options = {8, 60};
   options.seed = 3;
   RandomScene scene = MakeRandomScene(options);
   for (size_t i = 0; i < scene.problem.observations.size(); i += 10) {

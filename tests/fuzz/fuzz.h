@@ -9,6 +9,7 @@
 #include "krot/model.h"
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 
@@ -52,12 +53,8 @@ class ByteSource {
 // Five frames of a rig of two cameras and 16 points, a few pixels off: its
 // solve takes milliseconds.
 inline SyntheticScene FuzzScene() {
-  SceneOptions options;
-  options.num_frames = 5;
-  options.num_points = 16;
-  options.track_length = 4;
+  SceneOptions options = SceneOf(5, 16, 4, 0.5);
   options.sensors_per_rig = 2;
-  options.pixel_noise = 0.5;
   options.start_translation_noise = 0.003;
   options.start_point_noise = 0.003;
   options.random_seed = 3;

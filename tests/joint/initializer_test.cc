@@ -10,6 +10,7 @@
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 #include "tests/joint/small_scenes.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -127,12 +128,8 @@ TEST_P(FindStartTest, SolvesSyntheticRigsAndSingleCameras) {
   for (const int sensors_per_rig : {1, 3}) {
     for (const SceneLayout layout :
          {SceneLayout::kOrbit, SceneLayout::kStreet}) {
-      SceneOptions scene;
+      SceneOptions scene = SceneOf(12, 150, 4, 0.5);
       scene.layout = layout;
-      scene.num_frames = 12;
-      scene.num_points = 150;
-      scene.track_length = 4;
-      scene.pixel_noise = 0.5;
       scene.sensors_per_rig = sensors_per_rig;
       scene.rig_baseline = 0.05;
       const BuiltProblem built =

@@ -4,6 +4,7 @@
 #include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -15,12 +16,8 @@ TEST(SolveJoint, ProvesTheOptimumOfModelsWithGrossOutliers) {
     for (const unsigned seed : {1u, 2u, 3u}) {
       SCOPED_TRACE(testing::Message()
                    << static_cast<int>(layout) << ", seed " << seed);
-      SceneOptions scene;
+      SceneOptions scene = SceneOf(8, 200, 4, 0.5);
       scene.layout = layout;
-      scene.num_frames = 8;
-      scene.num_points = 200;
-      scene.track_length = 4;
-      scene.pixel_noise = 0.5;
       scene.outlier_ratio = 0.02;
       scene.random_seed = seed;
       const BuiltProblem built = BuildProblem(SynthesizeScene(scene).model, {});

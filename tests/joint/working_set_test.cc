@@ -13,12 +13,7 @@
 namespace krot::internal {
 namespace {
 
-RandomScene MakeScene() {
-  RandomSceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 60;
-  return MakeRandomScene(options);
-}
+RandomScene MakeScene() { return MakeRandomScene({6, 60}); }
 
 // The error of an observation in pixels, from the pose of its camera.
 double ErrorOf(const RandomScene& scene, const Observation& observation) {
@@ -185,9 +180,7 @@ TEST(WorkingSet, CostsWhatItsPointsCost) {
 // The bound is proved for all observations, whatever the solver looked at.
 TEST(WorkingSet, OfFewPointsHasTheOptimumOfAll) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
-    RandomSceneOptions random;
-    random.num_frames = 5;
-    random.num_points = 800;
+    RandomSceneOptions random = {5, 800};
     random.seed = seed;
     RandomScene scene = MakeRandomScene(random);
     JointOptions options;

@@ -10,6 +10,7 @@
 #include "krot/problem/subset.h"
 #include "tests/oracle/lp_oracle.h"
 #include "tests/outliers/outlier_scenes.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -198,10 +199,7 @@ TEST(PackConflicts, EndWhereTheirWorkIsUsedUp) {
 }
 
 TEST(FindConflict, OfAnImageTwiceInATrackIsThePair) {
-  SceneOptions options;
-  options.num_frames = 5;
-  options.num_points = 40;
-  options.track_length = 4;
+  SceneOptions options = SceneOf(5, 40, 4);
   options.duplicate_ratio = 0.2;
   options.random_seed = 7;
   Model model = SynthesizeScene(options).model;

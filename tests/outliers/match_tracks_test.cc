@@ -16,6 +16,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -24,11 +25,7 @@ using ::testing::IsEmpty;
 using Track = std::vector<std::pair<ImageId, uint32_t>>;
 
 Model MatchedScene(double pixel_noise = 0) {
-  SceneOptions options;
-  options.num_frames = 10;
-  options.num_points = 800;
-  options.track_length = 5;
-  options.pixel_noise = pixel_noise;
+  SceneOptions options = SceneOf(10, 800, 5, pixel_noise);
   options.random_seed = 4;
   return SynthesizeScene(options).ground_truth;
 }

@@ -14,9 +14,7 @@ namespace {
 constexpr double kLevel = 1;
 
 KnownRotationProblem MakeProblem() {
-  RandomSceneOptions options;
-  options.num_frames = 12;
-  options.num_points = 80;
+  RandomSceneOptions options = {12, 80};
   options.seed = 3;
   return MakeRandomScene(options).problem;
 }

@@ -3,18 +3,15 @@
 #include <cmath>
 
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 
 // Small scenes with pinhole cameras, noise and outliers.
 inline SceneOptions OutlierScene(uint64_t seed, double outlier_ratio,
                                  int num_points, double pixel_noise) {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = num_points;
-  options.track_length = 4;
+  SceneOptions options = SceneOf(6, num_points, 4, pixel_noise);
   options.camera_model_id = 1;
-  options.pixel_noise = pixel_noise;
   options.outlier_ratio = outlier_ratio;
   options.random_seed = seed;
   return options;

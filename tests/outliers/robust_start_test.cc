@@ -16,18 +16,15 @@
 #include "krot/outliers/parts.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 #include "tests/testing/weakly_tied.h"
 
 namespace krot::internal {
 namespace {
 
 SceneOptions Scene(double outlier_ratio, double rotation_noise_deg) {
-  SceneOptions options;
-  options.num_frames = 12;
-  options.num_points = 400;
-  options.track_length = 5;
+  SceneOptions options = SceneOf(12, 400, 5, 0.5);
   options.camera_model_id = 1;
-  options.pixel_noise = 0.5;
   options.outlier_ratio = outlier_ratio;
   options.rotation_noise_deg = rotation_noise_deg;
   options.random_seed = 5;

@@ -10,6 +10,7 @@
 #include "krot/model/rigs.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 // Scenes in which something that solvers like to take for granted is missing:
 // parallax, a baseline, noise, more than one point in common. The truth itself
@@ -229,12 +230,9 @@ TEST(AdversarialGeometry, PartsJoinedByOnePoint) {
 }
 
 Truth RigsOfBaseline(double baseline) {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 100;
+  SceneOptions options = SceneOf(6, 100, 6, 0.5);
   options.sensors_per_rig = 3;
   options.rig_baseline = baseline;
-  options.pixel_noise = 0.5;
   options.start_translation_noise = 1e-3;
   options.start_point_noise = 1e-3;
   const SyntheticScene scene = SynthesizeScene(options);

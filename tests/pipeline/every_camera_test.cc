@@ -10,6 +10,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/camera/random_camera.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -51,13 +52,9 @@ INSTANTIATE_TEST_SUITE_P(Models, EveryCamera, ::testing::Range(0, 18),
                          });
 
 TEST_P(EveryCamera, ReachesTheMaximumThatPinholesReachWithTheSameNoise) {
-  SceneOptions options;
+  SceneOptions options = SceneOf(8, 150, 4, 1);
   options.camera_model_id = GetParam();
   options.focal_length_factor = 0.5;  // up to 81 degrees off the axis
-  options.num_frames = 8;
-  options.num_points = 150;
-  options.track_length = 4;
-  options.pixel_noise = 1;
   options.start_translation_noise = 0.01;
   options.start_point_noise = 0.01;
   const SyntheticScene scene = SynthesizeScene(options);

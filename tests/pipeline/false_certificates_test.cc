@@ -12,6 +12,7 @@
 #include "krot/convert/certificate_file.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 // Certificates that were tampered with, and true ones of problems nearby. The
 // oracle is an estimate: a bound above its largest error is false, whatever
@@ -47,13 +48,9 @@ class Dice {
 };
 
 Model ProvedScene(uint64_t seed) {
-  SceneOptions options;
-  options.num_frames = 4;
-  options.num_points = 12;
-  options.track_length = 3;
+  SceneOptions options = SceneOf(4, 12, 3, 0.5);
   options.sensors_per_rig = seed % 3 == 0 ? 2 : 1;
   options.camera_model_id = seed % 2 == 0 ? 0 : 2;  // without a lens, with one
-  options.pixel_noise = 0.5;
   options.start_point_noise = 0.002;
   options.random_seed = seed;
   return SynthesizeScene(options).model;

@@ -15,6 +15,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/convert/lens_model.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -139,9 +140,7 @@ TEST(GivenBack, IsAModelWhoseErrorsFallOnlyWhereAllPointsBecomeOne) {
 }
 
 TEST(GivenBack, IsNotAModelWithoutNoiseWhoseErrorsFallToZero) {
-  SceneOptions scene;
-  scene.num_frames = 8;
-  scene.num_points = 100;
+  SceneOptions scene = SceneOf(8, 100);
   scene.start_translation_noise = 0.05;
   scene.start_point_noise = 0.05;
   const SolveSummary summary =
@@ -157,11 +156,7 @@ TEST(IsUnderdetermined, WhereObservationsAreNoMoreThanWhatTheyDetermine) {
   // 4 numbers of a point against 6 of two frames, 3 of each point, and 4 that
   // are free in any case.
   for (const int num_points : {1, 2, 3}) {
-    SceneOptions scene;
-    scene.num_frames = 2;
-    scene.num_points = num_points;
-    scene.track_length = 2;
-    scene.pixel_noise = 1;
+    SceneOptions scene = SceneOf(2, num_points, 2, 1);
     const SolveSummary summary =
         SolveModel(SynthesizeScene(scene).model, {}).summary;
     ASSERT_EQ(summary.num_observations, 2 * num_points);
@@ -172,10 +167,7 @@ TEST(IsUnderdetermined, WhereObservationsAreNoMoreThanWhatTheyDetermine) {
 // Of the truth, which least squares would hardly improve. Half of all
 // observations have a twin up to two pixels away.
 Model ModelOfTwins() {
-  SceneOptions scene;
-  scene.num_frames = 8;
-  scene.num_points = 100;
-  scene.pixel_noise = 0.7;
+  SceneOptions scene = SceneOf(8, 100, 6, 0.7);
   scene.duplicate_ratio = 0.5;
   return SynthesizeScene(scene).ground_truth;
 }

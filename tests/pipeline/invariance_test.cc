@@ -10,6 +10,7 @@
 #include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 // What a model is called and measured in decides nothing.
 
@@ -21,12 +22,8 @@ constexpr double kSolvedGap = 1e-5;
 constexpr double kTolerance = 2 * kSolvedGap;
 
 Model InvariantScene() {
-  SceneOptions options;
-  options.num_frames = 7;
-  options.num_points = 80;
-  options.track_length = 4;
+  SceneOptions options = SceneOf(7, 80, 4, 0.5);
   options.sensors_per_rig = 2;
-  options.pixel_noise = 0.5;
   options.start_translation_noise = 0.004;
   options.start_point_noise = 0.004;
   options.random_seed = 8;

@@ -8,6 +8,7 @@
 #include "krot/convert/reprojection.h"
 #include "krot/proof/certificate.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -16,11 +17,7 @@ namespace {
 // that do: the certificate is of rows at one estimate, the proof of those at
 // another.
 TEST(ProveRows, RepairsTheMultipliersOfALargeSupportForNewRows) {
-  SceneOptions scene;
-  scene.num_frames = 40;
-  scene.num_points = 4000;
-  scene.track_length = 10;
-  scene.pixel_noise = 1;
+  SceneOptions scene = SceneOf(40, 4000, 10, 1);
   scene.start_translation_noise = 0.003;
   scene.start_point_noise = 0.003;
   const Model model = SynthesizeScene(scene).model;

@@ -21,6 +21,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "krot/pipeline/stages.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -32,11 +33,7 @@ using Of = KnownPosition::Of;
 constexpr double kKept = 1e-6;  // of a radius
 
 SceneOptions Options() {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 60;
-  options.track_length = 4;
-  options.pixel_noise = 0.5;
+  SceneOptions options = SceneOf(6, 60, 4, 0.5);
   options.start_point_noise = 0.002;
   options.random_seed = 3;
   return options;

@@ -156,7 +156,7 @@ TEST(SolveInRounds, LeavesTheRowsOfItsLastEstimate) {
   BuiltProblem built = BuildProblem(model, {});
   Estimate estimate = built.start;
   SolveSummary summary;
-  SolveInRounds(model, {}, SolveMethod::kAuto, {}, Timer(), &built, &estimate,
+  SolveInRounds({model, {}, SolveMethod::kAuto, {}, Timer()}, &built, &estimate,
                 &summary);
   const double cost =
       Reprojection(model, built).TrueCost(estimate, Norm::L2(), 1);

@@ -9,17 +9,14 @@
 
 #include "krot/synthetic/scene.h"
 #include "tests/testing/multiplier_oracle.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
 
 Model NoisyModel(int camera_model_id) {
-  SceneOptions options;
+  SceneOptions options = SceneOf(8, 150, 5, 0.7);
   options.camera_model_id = camera_model_id;
-  options.num_frames = 8;
-  options.num_points = 150;
-  options.track_length = 5;
-  options.pixel_noise = 0.7;
   options.start_translation_noise = 0.005;
   options.start_point_noise = 0.005;
   return SynthesizeScene(options).model;

@@ -16,6 +16,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/pipeline/solve_by_ranks.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -26,12 +27,8 @@ using ::testing::IsEmpty;
 
 // Frames 1 away from the middle of the scene.
 Model Scene(int num_frames = 12) {
-  SceneOptions options;
-  options.num_frames = num_frames;
-  options.num_points = 150;
-  options.track_length = 5;
+  SceneOptions options = SceneOf(num_frames, 150, 5, 0.5);
   options.camera_model_id = 1;
-  options.pixel_noise = 0.5;
   options.start_translation_noise = 0.002;
   options.start_point_noise = 0.002;
   options.has_rigs = false;

@@ -11,6 +11,7 @@
 #include "krot/model/formats.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 #include "tests/testing/thread_ranks.h"
 
 // A solve by ranks that are threads of this process, and what its result is
@@ -20,11 +21,7 @@ namespace krot::internal {
 
 // Small, with enough noise for sweeps and the joint solver.
 inline SceneOptions SceneToShare() {
-  SceneOptions options;
-  options.num_frames = 12;
-  options.num_points = 400;
-  options.track_length = 4;
-  options.pixel_noise = 0.5;
+  SceneOptions options = SceneOf(12, 400, 4, 0.5);
   options.start_translation_noise = 0.005;
   options.start_point_noise = 0.005;
   return options;

@@ -17,6 +17,7 @@
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -24,11 +25,7 @@ namespace {
 constexpr Ignoring kWhatASolveChanges = {true, true, true};
 
 SceneOptions NoisyScene() {
-  SceneOptions options;
-  options.num_frames = 8;
-  options.num_points = 100;
-  options.track_length = 4;
-  options.pixel_noise = 0.5;
+  SceneOptions options = SceneOf(8, 100, 4, 0.5);
   options.start_translation_noise = 0.005;
   options.start_point_noise = 0.005;
   return options;
@@ -160,9 +157,7 @@ TEST(SolveModel, ListsTheSupportWorstFirstWithMultipliersOfSumOne) {
 }
 
 TEST(SolveModel, IsDoneAtOnceWhereEveryErrorIsZero) {
-  SceneOptions scene;
-  scene.num_frames = 8;
-  scene.num_points = 100;
+  SceneOptions scene = SceneOf(8, 100);
   const Model model = SynthesizeScene(scene).model;
   ASSERT_LT(CostOf(model), 1e-9);
   for (const SolveMethod method : {SolveMethod::kAuto, SolveMethod::kJoint}) {

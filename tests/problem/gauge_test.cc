@@ -246,9 +246,7 @@ TEST(RestoreGauge, IsNotMisledByAPointNearInfinity) {
 }
 
 TEST(RestoreGauge, OnlyTranslatesAComponentOfOneFrameAndOnePoint) {
-  RandomSceneOptions options;
-  options.num_frames = 1;
-  options.num_points = 1;
+  RandomSceneOptions options = {1, 1};
   const RandomScene scene = MakeRandomScene(options);
   Estimate restored = Moved(scene.problem, scene.estimate, 1, {4, 5, 6});
   RestoreGauge(scene.problem, scene.estimate, &restored);

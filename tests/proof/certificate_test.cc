@@ -19,11 +19,7 @@ namespace krot::internal {
 namespace {
 
 RandomScene MakeScene(unsigned seed, int views_per_frame, double baseline) {
-  RandomSceneOptions options;
-  options.num_frames = 5;
-  options.num_points = 40;
-  options.views_per_frame = views_per_frame;
-  options.baseline = baseline;
+  RandomSceneOptions options = {5, 40, views_per_frame, baseline};
   options.seed = seed;
   return MakeRandomScene(options);
 }

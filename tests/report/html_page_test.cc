@@ -15,6 +15,7 @@
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -24,10 +25,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 SyntheticScene SomeScene() {
-  SceneOptions options;
-  options.num_frames = 8;
-  options.num_points = 60;
-  options.pixel_noise = 1;
+  SceneOptions options = SceneOf(8, 60, 6, 1);
   options.start_point_noise = 0.01;
   return SynthesizeScene(options);
 }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -14,11 +15,7 @@ namespace {
 using ::testing::HasSubstr;
 
 SceneOptions SceneWithRepeatedImages() {
-  SceneOptions options;
-  options.num_frames = 5;
-  options.num_points = 50;
-  options.track_length = 4;
-  options.pixel_noise = 0.5;
+  SceneOptions options = SceneOf(5, 50, 4, 0.5);
   options.duplicate_ratio = 0.1;
   return options;
 }

@@ -12,6 +12,7 @@
 #include "krot/model/rigs.h"
 #include "tests/synthetic/scene_geometry.h"
 #include "tests/testing/model_matchers.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -108,9 +109,7 @@ TEST(SceneOfPanoramas, LooksInAllDirectionsAndItsTruthReproducesEveryPixel) {
 }
 
 TEST(Scene, HasTheNumbersOfFramesImagesAndPointsAskedFor) {
-  SceneOptions options;
-  options.num_frames = 12;
-  options.num_points = 321;
+  SceneOptions options = SceneOf(12, 321);
   options.sensors_per_rig = 3;
   const Model model = SynthesizeScene(options).model;
   EXPECT_EQ(model.frames.size(), 12u);
@@ -123,11 +122,8 @@ TEST(Scene, HasTheNumbersOfFramesImagesAndPointsAskedFor) {
 TEST(Scene, HasTracksOfTheMeanLengthAskedForAndNoneBelowTwo) {
   for (const SceneLayout layout : {SceneLayout::kOrbit, SceneLayout::kStreet}) {
     for (const double track_length : {2.0, 3.5, 10.0, 20.0}) {
-      SceneOptions options;
+      SceneOptions options = SceneOf(100, 2000, track_length);
       options.layout = layout;
-      options.num_frames = 100;
-      options.num_points = 2000;
-      options.track_length = track_length;
       const Model model = SynthesizeScene(options).ground_truth;
       const double mean = static_cast<double>(model.track_elements.size()) /
                           static_cast<double>(model.points3D.size());
@@ -140,10 +136,8 @@ TEST(Scene, HasTracksOfTheMeanLengthAskedForAndNoneBelowTwo) {
 }
 
 TEST(Scene, OfAStreetIsConnectedThroughNeighbouringFramesOnly) {
-  SceneOptions options;
+  SceneOptions options = SceneOf(1000, 20000);
   options.layout = SceneLayout::kStreet;
-  options.num_frames = 1000;
-  options.num_points = 20000;
   const Model model = SynthesizeScene(options).model;
   EXPECT_EQ(NumComponents(model, 1), 1);
   EXPECT_LE(MaxTrackSpan(model), 4 * 6);

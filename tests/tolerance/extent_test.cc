@@ -29,11 +29,7 @@ struct TolerantScene {
 // scale or `num_fixed` frames do.
 TolerantScene MakeTolerantScene(unsigned seed, Norm norm, double baseline,
                                 int num_fixed) {
-  RandomSceneOptions options;
-  options.num_frames = 4;
-  options.num_points = 8;
-  options.views_per_frame = baseline > 0 ? 2 : 1;
-  options.baseline = baseline;
+  RandomSceneOptions options = {4, 8, baseline > 0 ? 2 : 1, baseline};
   options.seed = seed;
   TolerantScene tolerant;
   tolerant.scene = MakeRandomScene(options);

@@ -9,6 +9,7 @@
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
 #include "krot/tolerance/tolerance_analysis.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -18,12 +19,8 @@ constexpr double kMetres = 50;
 
 struct MeasuredScene {
   MeasuredScene(uint64_t seed, int sensors_per_rig, int camera_model_id = 1) {
-    SceneOptions options;
-    options.num_frames = 6;
-    options.num_points = 40;
-    options.track_length = 4;
+    SceneOptions options = SceneOf(6, 40, 4, 0.5);
     options.camera_model_id = camera_model_id;
-    options.pixel_noise = 0.5;
     options.has_rigs = sensors_per_rig > 1;
     options.sensors_per_rig = sensors_per_rig;
     options.random_seed = seed;

@@ -13,6 +13,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/lp_oracle.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
@@ -20,12 +21,8 @@ namespace {
 using Eigen::Vector3d;
 
 SceneOptions SmallNoisyScene(uint64_t seed, int camera_model_id) {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 40;
-  options.track_length = 4;
+  SceneOptions options = SceneOf(6, 40, 4, 0.5);
   options.camera_model_id = camera_model_id;
-  options.pixel_noise = 0.5;
   options.random_seed = seed;
   return options;
 }

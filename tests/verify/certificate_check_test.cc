@@ -242,11 +242,8 @@ struct Case {
 class TamperedCertificate : public ::testing::TestWithParam<Case> {
  protected:
   void SetUp() override {
-    RandomSceneOptions options;
-    options.num_frames = 4;
-    options.num_points = 15;
-    options.views_per_frame = GetParam().baseline > 0 ? 2 : 1;
-    options.baseline = GetParam().baseline;
+    RandomSceneOptions options = {4, 15, GetParam().baseline > 0 ? 2 : 1,
+                                  GetParam().baseline};
     scene_ = MakeRandomScene(options);
     const std::optional<Certificate> certificate = Certify(
         scene_.problem, GetParam().norm,

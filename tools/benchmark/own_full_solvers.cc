@@ -24,9 +24,9 @@ class Schedule : public KnownRotationSolver {
     KnownMultipliers known;
     const Timer timer;
     const Context context{num_threads_, cancel};
-    SolveRows(problem, {}, method_, /*is_first_round=*/true,
-              /*have_rows_served=*/{}, context, timer, estimate, &known,
-              &summary);
+    SolveRows(problem, {/*model=*/{}, {}, method_, context, timer},
+              /*is_first_round=*/true, /*have_rows_served=*/{}, estimate,
+              &known, &summary);
     return !IsCancelled(cancel);
   }
 

@@ -1,7 +1,6 @@
 // For builds without Ceres: nothing can be adjusted.
 
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/base/check.h"
 
 namespace krot::internal {
 

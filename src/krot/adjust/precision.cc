@@ -12,7 +12,6 @@
 #include "krot/base/parallel_for.h"
 #include "krot/check.h"
 #include "krot/geometry.h"
-#include "krot/geometry/transform.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {

@@ -9,9 +9,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/camera/camera_model.h"
 #include "krot/camera/interval.h"
-#include "krot/context.h"
 #include "krot/convert/certificate_json.h"
 #include "krot/model/rigs.h"
 
@@ -209,11 +207,9 @@ bool HoldsBaselines(const std::string& json) {
 BaselineCertificate ParseBaselines(const std::string& text,
                                    const std::string& file_name) {
   return ParseFile(text, file_name, [](const PlacedJson& json) {
-    const PlacedJson version = json["version"];
-    if (version.json() != kBaselineCertificateVersion) {
-      version.Fail(std::to_string(kBaselineCertificateVersion));
-    }
     BaselineCertificate certificate;
+    certificate.version = ReadVersion(json, kBaselineCertificateVersion,
+                                      kBaselineCertificateVersion);
     certificate.tolerance_px = json["tolerance_px"].Number();
     for (const PlacedJson& pair : json["baselines"].Elements()) {
       certificate.pairs.push_back({pair["image_id1"].Integer<ImageId>(),

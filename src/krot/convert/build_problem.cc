@@ -8,7 +8,6 @@
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
-#include "krot/context.h"
 #include "krot/convert/reprojection.h"
 #include "krot/model/rigs.h"
 

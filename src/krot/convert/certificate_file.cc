@@ -185,11 +185,11 @@ std::vector<SupportObservation> ListSupport(const Model& model,
   for (const CertifiedObservation& o : certificate.observations) {
     if (!built.HasPixel(o.observation)) continue;
     const Observation& observation = built.problem.observations[o.observation];
-    const Image& image = model.images[built.image_of[observation.view]];
+    const auto [image_id, point2D_idx, point3D_id] =
+        KeyOf(model, built, o.observation);
     support.push_back(
-        {image.id, image.name,
-         static_cast<uint32_t>(built.point2D_of[o.observation]),
-         model.points3D[built.point_of[observation.point]].id, o.lambda / sum,
+        {image_id, model.images[built.image_of[observation.view]].name,
+         point2D_idx, point3D_id, o.lambda / sum,
          ResidualOf(ViewPoint(built.problem, observation, estimate), norm),
          HasImageTwice(built.problem, observation.point)});
   }
@@ -197,26 +197,39 @@ std::vector<SupportObservation> ListSupport(const Model& model,
   return support;
 }
 
-std::vector<CertificateFile::SupportObservation> DescribeSupport(
-    const Model& model, const BuiltProblem& built,
-    const PixelCertificate& certificate) {
-  std::vector<CertificateFile::SupportObservation> support;
+void Describe(const Model& model, const BuiltProblem& built,
+              const PixelCertificate& certificate, DescribedProof* proof) {
+  proof->lower_bound = certificate.lower_bound;
+  proof->rows_bound = certificate.rows.lower_bound;
+  proof->defect = certificate.rows.defect;
   for (size_t n = 0; n < certificate.bearings.size(); ++n) {
-    const CertifiedObservation& certified = certificate.rows.observations[n];
-    if (!built.HasPixel(certified.observation)) continue;
-    const Observation& observation =
-        built.problem.observations[certified.observation];
-    CertificateFile::SupportObservation o;
-    o.image_id = model.images[built.image_of[observation.view]].id;
-    o.point2D_idx =
-        static_cast<uint32_t>(built.point2D_of[certified.observation]);
-    o.point3D_id = model.points3D[built.point_of[observation.point]].id;
-    o.bearing = certificate.bearings[n];
-    o.lambda = certified.lambda;
-    o.y = certified.y;
-    support.push_back(o);
+    const CertifiedObservation& o = certificate.rows.observations[n];
+    if (!built.HasPixel(o.observation)) continue;
+    const auto [image_id, point2D_idx, point3D_id] =
+        KeyOf(model, built, o.observation);
+    proof->observations.push_back({image_id, point2D_idx, point3D_id,
+                                   certificate.bearings[n], o.lambda, o.y});
   }
-  return support;
+}
+
+PixelCertificate WithoutRows(const DescribedProof& proof) {
+  PixelCertificate certificate;
+  certificate.lower_bound = proof.lower_bound;
+  certificate.rows.lower_bound = proof.rows_bound;
+  certificate.rows.defect = proof.defect;
+  return certificate;
+}
+
+ObservationKey KeyOf(const DescribedProof::SupportObservation& o) {
+  return {o.image_id, o.point2D_idx, o.point3D_id};
+}
+
+ObservationKey KeyOf(const Model& model, const BuiltProblem& built,
+                     int64_t observation) {
+  const Observation& own = built.problem.observations[observation];
+  return {model.images[built.image_of[own.view]].id,
+          static_cast<uint32_t>(built.point2D_of[observation]),
+          model.points3D[built.point_of[own.point]].id};
 }
 
 namespace {
@@ -273,11 +286,8 @@ CertificateFile DescribeCertificate(const Model& model,
                                     const PixelCertificate& certificate) {
   CertificateFile file;
   file.norm = norm;
-  file.lower_bound = certificate.lower_bound;
-  file.rows_bound = certificate.rows.lower_bound;
-  file.defect = certificate.rows.defect;
   file.model_sha256 = ModelSha256(model);
-  file.observations = DescribeSupport(model, built, certificate);
+  Describe(model, built, certificate, &file);
   DescribeFixed(model, built, certificate, &file);
   DescribePositions(model, built, certificate, &file);
   return file;

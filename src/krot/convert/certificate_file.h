@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include <Eigen/Core>
@@ -67,10 +68,9 @@ std::vector<SupportObservation> ListSupport(const Model& model,
                                             const Estimate& estimate, Norm norm,
                                             const Certificate& certificate);
 
-// A certificate of a bound in true pixels (pixel_certificate.h) in terms of the
-// model's ids. This is what is written to a file; anyone who has the model can
-// check it (docs/formats.md).
-struct CertificateFile {
+// What the files of certificates and of conflicts have in common: the proof of
+// a bound in true pixels (pixel_certificate.h) in terms of the model's ids.
+struct DescribedProof {
   struct SupportObservation {
     ImageId image_id = 0;
     uint32_t point2D_idx = 0;
@@ -81,6 +81,15 @@ struct CertificateFile {
     Eigen::Vector2d y = Eigen::Vector2d::Zero();
   };
 
+  double lower_bound = 0;  // true pixels
+  double rows_bound = 0;   // delta of the rows, in pixels
+  double defect = 0;  // by how much the rows' multipliers miss (1), relative
+  std::vector<SupportObservation> observations;
+};
+
+// A certificate. This is what is written to a file; anyone who has the model
+// can check it (docs/formats.md).
+struct CertificateFile : DescribedProof {
   // Parts that must not move, and their positions, which the proof depends on.
   struct FixedImage {
     ImageId image_id = 0;
@@ -106,22 +115,24 @@ struct CertificateFile {
   };
 
   Norm norm;
-  double lower_bound = 0;  // true pixels
-  double rows_bound = 0;   // delta of the rows, in pixels
-  double defect = 0;  // by how much the rows' multipliers miss (1), relative
   std::string model_sha256;
-  std::vector<SupportObservation> observations;
   // The fixed parts in the support; of a frame its first image there.
   std::vector<FixedImage> fixed_images;
   std::vector<FixedPoint> fixed_points;
   std::vector<Position> positions;
 };
 
-// The observations in the support of a certificate of built.problem, in terms
-// of the model's ids.
-std::vector<CertificateFile::SupportObservation> DescribeSupport(
-    const Model& model, const BuiltProblem& built,
-    const PixelCertificate& certificate);
+// Describes a certificate of built.problem, without its rows of positions.
+void Describe(const Model& model, const BuiltProblem& built,
+              const PixelCertificate& certificate, DescribedProof* proof);
+// The bounds of the inverse; its rows are still to be found in a problem.
+PixelCertificate WithoutRows(const DescribedProof& proof);
+
+// Which 2D point an observation is, and of which 3D point.
+using ObservationKey = std::tuple<ImageId, uint32_t, Point3DId>;
+ObservationKey KeyOf(const DescribedProof::SupportObservation& o);
+ObservationKey KeyOf(const Model& model, const BuiltProblem& built,
+                     int64_t observation);
 
 // The whole certificate in terms of the model's ids.
 CertificateFile DescribeCertificate(const Model& model,
@@ -160,11 +171,7 @@ inline constexpr int kConflictFileVersion = 2;
 // others can be within a bound, or each within its own (docs/formats.md). Each
 // conflict is a certificate whose lower bound is above that bound.
 struct ConflictFile {
-  struct Conflict {
-    double lower_bound = 0;  // true pixels; > max_error
-    double rows_bound = 0;   // delta of the rows, pixels
-    double defect = 0;  // by how much the rows' multipliers miss (1), relative
-    std::vector<CertificateFile::SupportObservation> observations;
+  struct Conflict : DescribedProof {
     // Version 2: the bound of each observation, true pixels; > 0. The bounds
     // above, lambda and y then refer to errors that are multiplied by the
     // file's max_error and divided by the observation's bound.

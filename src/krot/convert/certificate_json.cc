@@ -73,6 +73,15 @@ Eigen::Quaterniond PlacedJson::Quaternion() const {
   return {q[0], q[1], q[2], q[3]};
 }
 
+int ReadVersion(const PlacedJson& file, int first, int last) {
+  const PlacedJson version = file["version"];
+  for (int known = first; known <= last; ++known) {
+    if (version.json() == known) return known;
+  }
+  version.Fail((first < last ? std::to_string(first) + " or " : "") +
+               std::to_string(last));
+}
+
 Json NormJson(Norm norm) {
   if (norm.p == 1) return "1";
   return norm.p == 2 ? "2" : "inf";
@@ -95,17 +104,16 @@ Json SupportJson(
   });
 }
 
-std::vector<CertificateFile::SupportObservation> ReadSupport(
-    const PlacedJson& observations) {
-  std::vector<CertificateFile::SupportObservation> support;
-  for (const PlacedJson& json : observations.Elements()) {
-    support.push_back({json["image_id"].Integer<ImageId>(),
-                       json["point2D_idx"].Integer<uint32_t>(),
-                       json["point3D_id"].Integer<Point3DId>(),
-                       json["bearing"].Triple(), json["lambda"].Number(),
-                       json["y"].Pair()});
+void ReadProof(const PlacedJson& json, DescribedProof* proof) {
+  proof->lower_bound = json["lower_bound"].Number();
+  proof->rows_bound = json["rows_bound"].Number();
+  proof->defect = json["defect"].Number();
+  for (const PlacedJson& o : json["observations"].Elements()) {
+    proof->observations.push_back(
+        {o["image_id"].Integer<ImageId>(), o["point2D_idx"].Integer<uint32_t>(),
+         o["point3D_id"].Integer<Point3DId>(), o["bearing"].Triple(),
+         o["lambda"].Number(), o["y"].Pair()});
   }
-  return support;
 }
 
 namespace {
@@ -197,17 +205,11 @@ std::string CertificateJson(const CertificateFile& file) {
 CertificateFile ParseCertificate(const std::string& text,
                                  const std::string& file_name) {
   return ParseFile(text, file_name, [](const PlacedJson& json) {
-    const PlacedJson version = json["version"];
-    if (version.json() != kCertificateVersion) {
-      version.Fail(std::to_string(kCertificateVersion));
-    }
+    ReadVersion(json, kCertificateVersion, kCertificateVersion);
     CertificateFile file;
     file.norm = ReadNorm(json["norm"]);
-    file.lower_bound = json["lower_bound"].Number();
-    file.rows_bound = json["rows_bound"].Number();
-    file.defect = json["defect"].Number();
     file.model_sha256 = json["model_sha256"].String();
-    file.observations = ReadSupport(json["observations"]);
+    ReadProof(json, &file);
     if (json.Has("fixed")) ReadFixed(json["fixed"], &file);
     if (json.Has("positions")) ReadPositions(json["positions"], &file);
     return file;

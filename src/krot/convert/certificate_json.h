@@ -84,6 +84,9 @@ auto ParseFile(const std::string& json, const std::string& file_name,
   }
 }
 
+// The member "version" of a file; fails unless it is in [first, last].
+int ReadVersion(const PlacedJson& file, int first, int last);
+
 // Whether the text is an object with this member.
 bool HasMember(const std::string& json, const char* key);
 
@@ -93,7 +96,7 @@ Norm ReadNorm(const PlacedJson& json);
 // The support of a certificate.
 CertificateFileJson SupportJson(
     const std::vector<CertificateFile::SupportObservation>& observations);
-std::vector<CertificateFile::SupportObservation> ReadSupport(
-    const PlacedJson& observations);
+// Reads its bounds and its support.
+void ReadProof(const PlacedJson& json, DescribedProof* proof);
 
 }  // namespace krot::internal

@@ -4,7 +4,6 @@
 #include <map>
 #include <optional>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include "krot/convert/pixel_certificate.h"
@@ -176,37 +175,30 @@ struct Translation {
 
 Translation Translate(const Model& model, const CertificateFile& file,
                       const BuiltProblem& built) {
-  using Key = std::tuple<ImageId, uint32_t, Point3DId>;
-  std::multimap<Key, const CertificateFile::SupportObservation*> by_key;
+  std::multimap<ObservationKey, const CertificateFile::SupportObservation*>
+      by_key;
   for (const CertificateFile::SupportObservation& o : file.observations) {
-    by_key.emplace(Key(o.image_id, o.point2D_idx, o.point3D_id), &o);
+    by_key.emplace(KeyOf(o), &o);
   }
   Translation translation;
+  translation.certificate = WithoutRows(file);
   Certificate& rows = translation.certificate.rows;
-  translation.certificate.lower_bound = file.lower_bound;
-  rows.lower_bound = file.rows_bound;
-  rows.defect = file.defect;
   const CertificatePositions positions(model, file, built);
-  const KnownRotationProblem& problem = built.problem;
-  for (size_t i = 0; i < problem.observations.size(); ++i) {
-    const Observation& own = problem.observations[i];
-    if (!built.HasPixel(static_cast<int64_t>(i))) {
-      const auto* row = positions.RowOf(static_cast<int64_t>(i));
+  const auto count = static_cast<int64_t>(built.problem.observations.size());
+  for (int64_t i = 0; i < count; ++i) {
+    if (!built.HasPixel(i)) {
+      const auto* row = positions.RowOf(i);
       if (row == nullptr) continue;
       translation.certificate.bearings.push_back(row->apex);
-      rows.observations.push_back(
-          {static_cast<int64_t>(i), row->lambda, row->y});
+      rows.observations.push_back({i, row->lambda, row->y});
       continue;
     }
-    const auto found =
-        by_key.find({model.images[built.image_of[own.view]].id,
-                     static_cast<uint32_t>(built.point2D_of[i]),
-                     model.points3D[built.point_of[own.point]].id});
+    const auto found = by_key.find(KeyOf(model, built, i));
     if (found == by_key.end()) continue;
     const CertificateFile::SupportObservation& o = *found->second;
     by_key.erase(found);
     translation.certificate.bearings.push_back(o.bearing);
-    rows.observations.push_back({static_cast<int64_t>(i), o.lambda, o.y});
+    rows.observations.push_back({i, o.lambda, o.y});
   }
   if (!by_key.empty()) {
     translation.is_unseen = true;

@@ -4,11 +4,9 @@
 #include <cmath>
 #include <map>
 #include <optional>
-#include <tuple>
 #include <utility>
 #include <vector>
 
-#include "krot/context.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/certificate_json.h"
 #include "krot/convert/pixel_certificate.h"
@@ -25,11 +23,8 @@ ConflictFile DescribeConflicts(
   file.model_sha256 = ModelSha256(model);
   if (!built.scales.empty()) file.version = kConflictFileVersion;
   for (const PixelCertificate& certificate : certificates) {
-    ConflictFile::Conflict conflict{certificate.lower_bound,
-                                    certificate.rows.lower_bound,
-                                    certificate.rows.defect,
-                                    DescribeSupport(model, built, certificate),
-                                    {}};
+    ConflictFile::Conflict conflict;
+    Describe(model, built, certificate, &conflict);
     if (!built.scales.empty()) {
       for (const CertifiedObservation& o : certificate.rows.observations) {
         conflict.max_errors.push_back(built.scales[o.observation] * max_error);
@@ -66,21 +61,14 @@ bool HoldsConflicts(const std::string& json) {
 ConflictFile ParseConflicts(const std::string& text,
                             const std::string& file_name) {
   return ParseFile(text, file_name, [](const PlacedJson& json) {
-    const PlacedJson version = json["version"];
-    if (version.json() != 1 && version.json() != kConflictFileVersion) {
-      version.Fail("1 or 2");
-    }
     ConflictFile file;
-    file.version = version.json();
+    file.version = ReadVersion(json, 1, kConflictFileVersion);
     file.norm = ReadNorm(json["norm"]);
     file.max_error = json["max_error"].Number();
     file.model_sha256 = json["model_sha256"].String();
     for (const PlacedJson& one : json["conflicts"].Elements()) {
       ConflictFile::Conflict& conflict = file.conflicts.emplace_back();
-      conflict.lower_bound = one["lower_bound"].Number();
-      conflict.rows_bound = one["rows_bound"].Number();
-      conflict.defect = one["defect"].Number();
-      conflict.observations = ReadSupport(one["observations"]);
+      ReadProof(one, &conflict);
       if (file.version != kConflictFileVersion) continue;
       for (const PlacedJson& bound : one["max_errors"].Elements()) {
         conflict.max_errors.push_back(bound.Number());
@@ -106,26 +94,21 @@ struct Entry {
 // once.
 std::vector<Entry> FindEntries(const Model& model, const BuiltProblem& built,
                                const ConflictFile& file) {
-  using Key = std::tuple<ImageId, uint32_t, Point3DId>;
   std::vector<Entry> entries;
-  std::multimap<Key, size_t> by_key;
+  std::multimap<ObservationKey, size_t> by_key;
   for (size_t n = 0; n < file.conflicts.size(); ++n) {
     const std::vector<Support>& observations = file.conflicts[n].observations;
     for (size_t place = 0; place < observations.size(); ++place) {
       const Support& o = observations[place];
-      by_key.emplace(Key(o.image_id, o.point2D_idx, o.point3D_id),
-                     entries.size());
+      by_key.emplace(KeyOf(o), entries.size());
       entries.push_back({n, place, &o});
     }
   }
-  for (size_t i = 0; i < built.problem.observations.size(); ++i) {
-    const Observation& own = built.problem.observations[i];
-    const auto found =
-        by_key.find({model.images[built.image_of[own.view]].id,
-                     static_cast<uint32_t>(built.point2D_of[i]),
-                     model.points3D[built.point_of[own.point]].id});
+  const auto count = static_cast<int64_t>(built.problem.observations.size());
+  for (int64_t i = 0; i < count; ++i) {
+    const auto found = by_key.find(KeyOf(model, built, i));
     if (found == by_key.end()) continue;
-    entries[found->second].index = static_cast<int64_t>(i);
+    entries[found->second].index = i;
     by_key.erase(found);
   }
   return entries;
@@ -168,10 +151,7 @@ std::optional<std::string> RefuseConflict(const Model& model,
   }
   std::vector<int64_t> observations;
   std::vector<double> scales;
-  PixelCertificate certificate;
-  certificate.lower_bound = conflict.lower_bound;
-  certificate.rows.lower_bound = conflict.rows_bound;
-  certificate.rows.defect = conflict.defect;
+  PixelCertificate certificate = WithoutRows(conflict);
   for (const Entry& entry : entries) {
     certificate.rows.observations.push_back(
         {static_cast<int64_t>(observations.size()), entry.observation->lambda,

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "krot/convert/build_problem.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {

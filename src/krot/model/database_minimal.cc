@@ -1,6 +1,5 @@
 // For builds without SQLite: databases can be neither read nor written.
 
-#include "krot/base/write_file.h"
 #include "krot/database.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "krot/base/numbers.h"
-#include "krot/base/write_file.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model/rigs.h"
 

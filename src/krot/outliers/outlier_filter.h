@@ -157,15 +157,11 @@ struct SnoopingSummary {
   PixelErrorStatistics kept_error_before;
 };
 
-struct OutlierFilterSummary {
+struct OutlierFilterSummary : OutlierFindings {
   OutlierMethod method = OutlierMethod::kConflicts;
-  // True pixels; 0: there is none, because noise explains all errors.
-  double max_error = 0;
   std::optional<NoiseSummary> noise;  // with a profile or without a bound
   Norm norm;
   SolveInit init = SolveInit::kModel;  // that was used
-  // From nothing: parts that few tracks tie to the rest.
-  std::vector<WeakPart> weak_parts;
   // Whether the bound, chosen by noise, is above what a start may have
   // (SolveModelOptions::init_max_error).
   bool is_bound_beyond_reason = false;
@@ -175,31 +171,12 @@ struct OutlierFilterSummary {
 
   int64_t num_observations = 0;  // of the input
   int64_t num_points = 0;
-  // Observations that do not fit; largest error in the input first.
-  std::vector<RemovedObservation> removed;
-  // Observations that fit, but were left alone in their tracks and went with
-  // them.
-  int64_t num_left_alone = 0;
-  int64_t num_points_removed = 0;
-  // At least so many had to go, whatever is done: the number of disjoint
-  // conflicts. With kSnooping each observation's bound is what noise explains
-  // of it.
-  int64_t num_proved = 0;
-  // Whether the search for conflicts ended because there was nothing left to
-  // try. It is cut short where hardly anything can be decided.
-  bool is_search_complete = true;
   int64_t num_irreducible = 0;            // of the conflicts
   std::optional<ConflictFile> conflicts;  // kConflicts, kSnooping
-  // Most removed observations first; only those with removed ones are listed.
-  std::vector<Suspect> tracks, images, cameras;
-  std::optional<RotationSuspect> rotation_suspect;
 
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;
-  // Whether all errors of the result are within the bound, if there is one.
-  bool is_within = false;
-  std::optional<ErrorProfileSummary> profile;  // if asked for
-  std::optional<SnoopingSummary> snooping;     // kSnooping
+  std::optional<SnoopingSummary> snooping;  // kSnooping
   std::optional<SolveSummary> solve;  // of what is left; none if nothing is
   int num_solves = 0;
 

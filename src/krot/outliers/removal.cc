@@ -281,8 +281,9 @@ OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
   options.norm = norm;
   options.joint.relative_gap = 1e-3;
   SolveSummary summary;
-  optimum.proof = SolveInRounds(model, options, SolveMethod::kJoint, context,
-                                Timer(), &part, &estimate, &summary);
+  optimum.proof =
+      SolveInRounds({model, options, SolveMethod::kJoint, context, Timer()},
+                    &part, &estimate, &summary);
   optimum.max_error =
       reprojection.TrueCost(estimate, norm, context.num_threads);
   if (optimum.proof) {

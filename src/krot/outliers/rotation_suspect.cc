@@ -1,7 +1,6 @@
 #include "krot/outliers/outlier_filter.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <utility>
 

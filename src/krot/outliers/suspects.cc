@@ -1,8 +1,6 @@
 #include "krot/outliers/outlier_filter.h"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <set>

@@ -1,8 +1,6 @@
 #include "krot/pipeline/stages.h"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,23 +20,22 @@ constexpr double kFarFromRows = 0.5;
 
 class Rounds {
  public:
-  Rounds(const Model& model, const SolveModelOptions& options,
-         SolveMethod method, const Context& context, const Timer& timer,
-         BuiltProblem* built, Estimate* estimate, SolveSummary* summary)
-      : model_(model),
-        options_(options),
-        rows_options_(options),
-        method_(method),
-        context_(context),
-        timer_(timer),
-        reprojection_(model, *built),
+  Rounds(const SolveRun& run, BuiltProblem* built, Estimate* estimate,
+         SolveSummary* summary)
+      : model_(run.model),
+        options_(run.options),
+        rows_options_(run.options),
+        method_(run.method),
+        context_(run.context),
+        timer_(run.timer),
+        reprojection_(run.model, *built),
         built_(*built),
         estimate_(*estimate),
         summary_(*summary),
-        positions_(model, options_, context_, reprojection_, estimate_, built),
+        positions_(model_, options_, context_, reprojection_, estimate_, built),
         cost_(LevelledCost(estimate_)),
-        sufficient_cost_(SufficientCost(options, method)),
-        bounds_(options.joint.relative_gap) {
+        sufficient_cost_(SufficientCost(options_, method_)),
+        bounds_(options_.joint.relative_gap) {
     if (positions_.Any()) {
       rows_options_.joint.relative_gap *= 0.05;
     }
@@ -158,12 +155,12 @@ class Rounds {
     Estimate solved = estimate_;
     is_bound_near_ = false;
     std::optional<Certificate> of_these = SolveRows(
-        problem, rows_options_, method_, summary_.rounds.empty(),
+        problem, {model_, rows_options_, method_, context_, timer_},
+        summary_.rounds.empty(),
         [this](const Estimate& swept, double linear_cost) {
           return HaveRowsServed(swept, linear_cost);
         },
-        context_, timer_, &solved, bounded ? nullptr : &known_multipliers_,
-        &summary_);
+        &solved, bounded ? nullptr : &known_multipliers_, &summary_);
     if (options_.res_int.update_frames) {
       RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_, &solved);
     }
@@ -215,8 +212,7 @@ class Rounds {
         options_.res_int.fast_descent.settings == FastDescentSettings::kPaper;
     if (reprojection_.IsLinear() || is_as_in_paper || IsUsedUp() ||
         IsRefuted() || IsInterrupted() || IsGapReached() ||
-        IsSufficient(cost_) ||
-        IsZeroUpToRounding(cost_)) {
+        IsSufficient(cost_) || IsZeroUpToRounding(cost_)) {
       return false;
     }
     if (has_level || is_bound_near_) return true;
@@ -264,7 +260,7 @@ class Rounds {
   }
 
   const Model& model_;
-  const SolveModelOptions options_;
+  const SolveModelOptions& options_;
   SolveModelOptions rows_options_;  // for SolveRows
   const SolveMethod method_;
   const Context& context_;
@@ -288,12 +284,11 @@ class Rounds {
 
 }  // namespace
 
-std::optional<PixelCertificate> SolveInRounds(
-    const Model& model, const SolveModelOptions& options, SolveMethod method,
-    const Context& context, const Timer& timer, BuiltProblem* built,
-    Estimate* estimate, SolveSummary* summary) {
-  Rounds rounds(model, options, method, context, timer, built, estimate,
-                summary);
+std::optional<PixelCertificate> SolveInRounds(const SolveRun& run,
+                                              BuiltProblem* built,
+                                              Estimate* estimate,
+                                              SolveSummary* summary) {
+  Rounds rounds(run, built, estimate, summary);
   rounds.Run();
   return rounds.certificate();
 }

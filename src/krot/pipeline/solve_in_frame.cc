@@ -13,7 +13,6 @@
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
 #include "krot/model/rigs.h"
-#include "krot/model/model_io.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
@@ -120,9 +119,10 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
 
 // Finds the estimate to start from. If there is none, returns false and sets
 // the termination to the reason.
-bool FindEstimate(const Model& model, const SolveModelOptions& options,
-                  const Context& context, const Timer& timer, Start* start,
-                  Estimate* estimate, SolveSummary* summary) {
+bool FindEstimate(const SolveRun& run, Start* start, Estimate* estimate,
+                  SolveSummary* summary) {
+  const SolveModelOptions& options = run.options;
+  const Context& context = run.context;
   if (start->init == SolveInit::kModel) {
     *estimate = start->built.start;
     return true;
@@ -136,9 +136,9 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   // If there is no start, rows of this level prove a bound for the positions:
   // their level must be below it.
   TakePositionRowsOfStart(0.99 * options.init_max_error, &start->built);
-  FoundStart found =
-      FindFeasibleStart(start->built.problem, options, context,
-                        LogIterations(options.joint.callback, timer, summary));
+  FoundStart found = FindFeasibleStart(
+      start->built.problem, options, context,
+      LogIterations(options.joint.callback, run.timer, summary));
   if (found.estimate) {
     *estimate = *std::move(found.estimate);
     return true;
@@ -147,14 +147,14 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   const bool was_asked =
       options.init == SolveInit::kFeasible || !start->built.positions.empty();
   if (found.termination == SolveTermination::kInterrupted || was_asked) {
-    CertifyInfeasible(model, start->built, options, context, found.certificate,
-                      summary);
+    CertifyInfeasible(run.model, start->built, options, context,
+                      found.certificate, summary);
     return false;
   }
   context.Note("there is none; going on without those observations");
-  *start = OwnStart(model, options, context);
+  *start = OwnStart(run.model, options, context);
   summary->init = start->init;
-  CountProblem(model, start->built, context, summary);
+  CountProblem(run.model, start->built, context, summary);
   *estimate = start->built.start;
   summary->termination = SolveTermination::kNothingToSolve;
   return !start->built.problem.observations.empty();
@@ -162,17 +162,17 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
 
 // Whether the finish can start right away. If so, takes the rows at the
 // estimate.
-bool IsFinishEnough(const Model& model, const SolveModelOptions& options,
-                    const Context& context, const Estimate& estimate,
+bool IsFinishEnough(const SolveRun& run, const Estimate& estimate,
                     BuiltProblem* built, SolveSummary* summary) {
-  const double sufficient = SufficientCost(options, summary->method);
+  const double sufficient = SufficientCost(run.options, run.method);
   if (sufficient == 0) return false;
-  const Reprojection reprojection(model, *built);
+  const int num_threads = run.context.num_threads;
+  const Reprojection reprojection(run.model, *built);
   const double cost = MaxOfRanks(
-      context,
-      reprojection.TrueCost(estimate, options.norm, context.num_threads));
+      run.context,
+      reprojection.TrueCost(estimate, run.options.norm, num_threads));
   if (!(cost < sufficient)) return false;
-  reprojection.TakeRows(estimate, context.num_threads, &built->problem);
+  reprojection.TakeRows(estimate, num_threads, &built->problem);
   summary->cost_initial = summary->cost_final = cost;
   summary->termination = SolveTermination::kWithinBound;
   return true;
@@ -281,22 +281,19 @@ SolveModelResult SolveInFrame(const Model& model,
   }
 
   const Timer solve_timer;
+  const SolveRun run{model, options, summary.method, context, solve_timer};
   Estimate estimate;
-  if (!FindEstimate(model, options, context, solve_timer, &start, &estimate,
-                    &summary)) {
+  if (!FindEstimate(run, &start, &estimate, &summary)) {
     summary.seconds_solve = solve_timer.Seconds();
     result.model = model;
     return result;
   }
   std::optional<PixelCertificate> certificate;
-  if (!IsFinishEnough(model, options, context, estimate, &start.built,
-                      &summary)) {
-    certificate = SolveInRounds(model, options, summary.method, context,
-                                solve_timer, &start.built, &estimate, &summary);
+  if (!IsFinishEnough(run, estimate, &start.built, &summary)) {
+    certificate = SolveInRounds(run, &start.built, &estimate, &summary);
     if (summary.method == SolveMethod::kAuto && context.ranks == nullptr &&
         options.problem.positions.empty() && HasJointSolver(options.norm)) {
-      TryOtherWays(model, options, context, solve_timer, &start, &estimate,
-                   &certificate, &summary);
+      TryOtherWays(run, &start, &estimate, &certificate, &summary);
     }
   }
   if (summary.termination == SolveTermination::kInfeasible) {
@@ -310,9 +307,9 @@ SolveModelResult SolveInFrame(const Model& model,
       summary.termination != SolveTermination::kInterrupted) {
     context.Stage("finding the least squares below the largest error");
     RunFinish(
-        model, options,
+        run,
         certificate ? std::optional(certificate->lower_bound) : std::nullopt,
-        context, &start.built, &estimate, &summary);
+        &start.built, &estimate, &summary);
   }
   summary.loose = SettleEstimate(model, start.built,
                                  {options.norm, options.res_int.update_frames},

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -132,18 +131,14 @@ struct PositionFactor {
   std::optional<CertificateFile> certificate;
 };
 
-struct SolveSummary {
-  SolveTermination termination = SolveTermination::kNotRun;
-  SolveMethod method = SolveMethod::kAuto;  // the one used, not the one asked
-  SolveInit init = SolveInit::kModel;       // likewise
+// The findings are those of CheckPixelCertificate, if it accepted the final
+// certificate, and the result is the model written, before a polish.
+struct SolveSummary : SolveFindings {
+  SolveInit init = SolveInit::kModel;  // the one used, not the one asked for
   Norm norm;
 
-  // What took part in the optimisation, and what did not.
+  // More of what took part in the optimisation, and what did not.
   int64_t num_frames = 0;
-  int64_t num_images = 0;
-  int64_t num_points = 0;
-  int64_t num_observations = 0;
-  int32_t num_components = 0;
   int64_t num_fixed_frames = 0;
   int64_t num_fixed_points = 0;
   int64_t num_positions = 0;  // known positions
@@ -151,7 +146,6 @@ struct SolveSummary {
   // radius, in the model written.
   double largest_position_ratio = 0;
   std::optional<PositionFactor> position_factor;  // if asked for
-  std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
   int64_t num_same_image_tracks = 0;  // tracks with an image more than once
   // The largest error of the observations left out as kSameImage, in the model
@@ -174,20 +168,14 @@ struct SolveSummary {
   // The size of the joint solver's last working set; none if it did not run.
   std::optional<int64_t> num_working_observations;
 
-  // What the final certificate proves, if CheckPixelCertificate accepted it.
-  bool is_certified = false;
-  std::optional<double> lower_bound;  // true pixels
-  std::optional<double>
-      relative_gap;  // (cost_final - lower_bound) / cost_final, if finite
-  std::vector<SupportObservation> support;         // worst first
-  std::vector<SupportPosition> support_positions;  // largest share first
-  std::optional<CertificateFile> certificate;      // if asked for
+  bool is_certified = false;  // CheckPixelCertificate accepted the certificate
+  std::optional<CertificateFile> certificate;  // if asked for
 
-  // The input is given back, because the estimate that was found is worse: its
-  // largest error in the p-norm, over all observations that had a finite error
-  // in the input, is above both the input's largest and finish.max_error; or
-  // most of its points fell together (collapse.IsWhole()).
-  bool is_given_back = false;
+  // The input is given back (is_given_back) if the estimate that was found is
+  // worse: its largest error in the p-norm, over all observations that had a
+  // finite error in the input, is above both the input's largest and
+  // finish.max_error; or most of its points fell together (collapse.IsWhole()).
+  //
   // For a model whose images and tracks contradict each other: the largest
   // error by the images' side (WorseImagesSide) before and after, pixels in the
   // p-norm. Set where it has become worse and is above finish.max_error; then
@@ -195,9 +183,6 @@ struct SolveSummary {
   std::optional<std::pair<double, double>> worse_images_side;
   // What has degenerated in the estimate, compared with the input.
   Collapse collapse;
-  // Whether there are no more equations (two per observation) than unknowns, so
-  // that an error of zero says nothing.
-  bool is_underdetermined = false;
 
   // The images and points that are not determined in the model written.
   LooseParts loose;
@@ -232,10 +217,10 @@ struct SolveSummary {
 struct SolveModelOptions {
   SolveMethod method = SolveMethod::kAuto;
   SolveInit init = SolveInit::kModel;
-  double init_max_error = 100;        // of a start; pixels; > 0
+  double init_max_error = 100;  // of a start; pixels; > 0
   // For kFeasible, with neither fixed parts nor known positions: where to start
-  // if all residuals there are below init_max_error. Otherwise, as without it, a
-  // start is looked for. Of the problem that is built without the model's own
+  // if all residuals there are below init_max_error. Otherwise, as without it,
+  // a start is looked for. Of the problem that is built without the model's own
   // positions.
   std::optional<Estimate> found_start;
   bool describe_certificate = false;  // fill SolveSummary::certificate

@@ -1,7 +1,6 @@
 #include "krot/pipeline/stages.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -18,17 +17,16 @@ namespace {
 
 class Schedule {
  public:
-  Schedule(const KnownRotationProblem& problem,
-           const SolveModelOptions& options, const Context& context,
-           const Timer& timer, Estimate* estimate, SolveSummary* summary)
+  Schedule(const KnownRotationProblem& problem, const SolveRun& run,
+           Estimate* estimate, SolveSummary* summary)
       : problem_(problem),
-        options_(options),
-        context_(context),
-        timer_(timer),
+        options_(run.options),
+        context_(run.context),
+        timer_(run.timer),
         estimate_(*estimate),
         summary_(*summary),
-        cost_(MaxOfRanks(context, Cost(problem, *estimate, options.norm,
-                                       context.num_threads))) {}
+        cost_(MaxOfRanks(context_, Cost(problem, *estimate, options_.norm,
+                                        context_.num_threads))) {}
 
   void Sweeps(ResIntOptions res_int) {
     res_int.norm = options_.norm;
@@ -107,8 +105,8 @@ class Schedule {
   }
 
   const KnownRotationProblem& problem_;
-  const SolveModelOptions options_;
-  const Context context_;
+  const SolveModelOptions& options_;
+  const Context& context_;
   const Timer& timer_;
   Estimate& estimate_;
   SolveSummary& summary_;
@@ -118,16 +116,15 @@ class Schedule {
 }  // namespace
 
 std::optional<Certificate> SolveRows(
-    const KnownRotationProblem& problem, const SolveModelOptions& options,
-    SolveMethod method, bool is_first_round,
+    const KnownRotationProblem& problem, const SolveRun& run,
+    bool is_first_round,
     const std::function<bool(const Estimate& swept, double linear_cost)>&
         have_rows_served,
-    const Context& context, const Timer& timer, Estimate* estimate,
-    KnownMultipliers* known, SolveSummary* summary) {
-  Schedule schedule(problem, options, context, timer, estimate, summary);
-  switch (method) {
+    Estimate* estimate, KnownMultipliers* known, SolveSummary* summary) {
+  Schedule schedule(problem, run, estimate, summary);
+  switch (run.method) {
     case SolveMethod::kResInt: {
-      ResIntOptions res_int = options.res_int;
+      ResIntOptions res_int = run.options.res_int;
       if (!is_first_round && res_int.update_frames) {
         res_int.max_sweeps -= static_cast<int>(summary->sweeps.size());
       }
@@ -203,11 +200,13 @@ const char* PolishName(Polish polish) {
 
 namespace {
 
-void FinishByLeastSquares(const Reprojection& reprojection,
-                          const SolveModelOptions& options,
+void FinishByLeastSquares(const SolveRun& run,
                           std::optional<double> lower_bound,
-                          const Context& context, BuiltProblem* built,
-                          Estimate* estimate, SolveSummary* summary) {
+                          BuiltProblem* built, Estimate* estimate,
+                          SolveSummary* summary) {
+  const SolveModelOptions& options = run.options;
+  const Context& context = run.context;
+  const Reprojection reprojection(run.model, *built);
   const Timer timer;
   FinishSummary finish;
   finish.lowest_cost = summary->cost_final;
@@ -271,15 +270,13 @@ void FinishByLeastSquares(const Reprojection& reprojection,
 
 }  // namespace
 
-void RunFinish(const Model& model, const SolveModelOptions& options,
-               std::optional<double> lower_bound, const Context& context,
+void RunFinish(const SolveRun& run, std::optional<double> lower_bound,
                BuiltProblem* built, Estimate* estimate, SolveSummary* summary) {
-  if (options.finish.finish == Finish::kNone) return;
+  if (run.options.finish.finish == Finish::kNone) return;
   if (!IsZeroUpToRounding(summary->cost_final)) {
-    FinishByLeastSquares(Reprojection(model, *built), options, lower_bound,
-                         context, built, estimate, summary);
+    FinishByLeastSquares(run, lower_bound, built, estimate, summary);
   }
-  if (context.IsCancelled()) {
+  if (run.context.IsCancelled()) {
     summary->termination = SolveTermination::kInterrupted;
   }
 }

@@ -21,6 +21,15 @@ inline bool HasJointSolver(Norm norm) {
   return norm.p == 2 || norm.IsPolyhedral();
 }
 
+// What the stages of one solve share. Holds references.
+struct SolveRun {
+  const Model& model;
+  const SolveModelOptions& options;
+  SolveMethod method;
+  const Context& context;
+  const Timer& timer;  // since the solve's start
+};
+
 // SolveModel in the coordinates of the model as they are. SolveModel calls it
 // with a model that was moved to a local frame near the origin if necessary.
 SolveModelResult SolveInFrame(const Model& model,
@@ -76,9 +85,7 @@ FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
 // the estimate of the least true cost, its problem, and the highest
 // certificate; appends to the summary's rounds, sweeps and iterations. Each way
 // may take a hundred iterations, or as many as the solve has taken if more.
-void TryOtherWays(const Model& model, const SolveModelOptions& options,
-                  const Context& context, const Timer& timer, Start* start,
-                  Estimate* estimate,
+void TryOtherWays(const SolveRun& run, Start* start, Estimate* estimate,
                   std::optional<PixelCertificate>* certificate,
                   SolveSummary* summary);
 
@@ -101,14 +108,14 @@ void TryOtherWays(const Model& model, const SolveModelOptions& options,
 // Fills in costs, rounds, termination, sweeps and iterations of the summary and
 // returns the certificate with the highest bound, unchecked. In the end the
 // rows of `built` are those taken at `*estimate`.
-std::optional<PixelCertificate> SolveInRounds(
-    const Model& model, const SolveModelOptions& options, SolveMethod method,
-    const Context& context, const Timer& timer, BuiltProblem* built,
-    Estimate* estimate, SolveSummary* summary);
+std::optional<PixelCertificate> SolveInRounds(const SolveRun& run,
+                                              BuiltProblem* built,
+                                              Estimate* estimate,
+                                              SolveSummary* summary);
 
-// Solves the linear rows of one round by the stages of `method`, from an
+// Solves the linear rows of one round by the stages of run.method, from an
 // estimate of positive depths. Appends to the summary's sweeps and iterations,
-// with the seconds of `timer`, and sets its termination. Returns the
+// with the seconds of run.timer, and sets its termination. Returns the
 // certificate of the joint solver, if it has one. The rows' cost rises by
 // rounding at most. Only the first round of kAuto looks for another start.
 // `have_rows_served` may be empty. kAuto calls it after its sweeps, with their
@@ -116,12 +123,11 @@ std::optional<PixelCertificate> SolveInRounds(
 // better to take the rows anew, the joint solver is not run and the termination
 // is kStalled.
 std::optional<Certificate> SolveRows(
-    const KnownRotationProblem& problem, const SolveModelOptions& options,
-    SolveMethod method, bool is_first_round,
+    const KnownRotationProblem& problem, const SolveRun& run,
+    bool is_first_round,
     const std::function<bool(const Estimate& swept, double linear_cost)>&
         have_rows_served,
-    const Context& context, const Timer& timer, Estimate* estimate,
-    KnownMultipliers* known, SolveSummary* summary);
+    Estimate* estimate, KnownMultipliers* known, SolveSummary* summary);
 
 // A certificate of rows. observation_of maps indices of its rows to those of
 // the whole problem's observations; -1 marks a row that is no observation;
@@ -195,8 +201,7 @@ double SufficientCost(const SolveModelOptions& options, SolveMethod method);
 //
 // Fills in SolveSummary::finish if it succeeds. In the end the rows of `built`
 // are those taken at `*estimate`.
-void RunFinish(const Model& model, const SolveModelOptions& options,
-               std::optional<double> lower_bound, const Context& context,
+void RunFinish(const SolveRun& run, std::optional<double> lower_bound,
                BuiltProblem* built, Estimate* estimate, SolveSummary* summary);
 
 // Half the sum of the losses of the true errors, squared pixels: the objective

@@ -175,14 +175,12 @@ bool IsWithin(double relative_gap,
 }
 
 // The estimate from which another way starts; none if none is found.
-std::optional<Estimate> OtherStart(const Start& other,
-                                   const SolveModelOptions& options,
-                                   const Context& context, const Timer& timer,
+std::optional<Estimate> OtherStart(const Start& other, const SolveRun& run,
                                    SolveSummary* summary) {
   if (other.init == SolveInit::kModel) return other.built.start;
   return FindFeasibleStart(
-             other.built.problem, options, context,
-             LogIterations(options.joint.callback, timer, summary))
+             other.built.problem, run.options, run.context,
+             LogIterations(run.options.joint.callback, run.timer, summary))
       .estimate;
 }
 
@@ -193,11 +191,11 @@ void Append(const std::vector<Value>& from, std::vector<Value>* to) {
 
 }  // namespace
 
-void TryOtherWays(const Model& model, const SolveModelOptions& options,
-                  const Context& context, const Timer& timer, Start* start,
-                  Estimate* estimate,
+void TryOtherWays(const SolveRun& run, Start* start, Estimate* estimate,
                   std::optional<PixelCertificate>* certificate,
                   SolveSummary* summary) {
+  const SolveModelOptions& options = run.options;
+  const Context& context = run.context;
   SolveModelOptions other_options = options;
   other_options.joint.max_iterations = std::min(
       options.joint.max_iterations,
@@ -216,19 +214,20 @@ void TryOtherWays(const Model& model, const SolveModelOptions& options,
     other_options.init = is_own ? SolveInit::kModel : SolveInit::kFeasible;
     context.Stage(is_own ? "that stalled; joint iterations from the model"
                          : "that stalled; from a start from nothing");
+    const SolveRun other_run{run.model, other_options,
+                             is_own ? SolveMethod::kJoint : run.method, context,
+                             run.timer};
     Start other =
-        is_own ? OwnStart(model, other_options, context)
-               : ChooseStart(model, other_options, summary->method, context);
+        is_own ? OwnStart(run.model, other_options, context)
+               : ChooseStart(run.model, other_options, run.method, context);
     if (other.built.NumPixels() != start->built.NumPixels()) continue;
     SolveSummary way;
     way.method = summary->method;
     way.norm = summary->norm;
-    std::optional<Estimate> found =
-        OtherStart(other, other_options, context, timer, &way);
+    std::optional<Estimate> found = OtherStart(other, other_run, &way);
     if (found) {
-      std::optional<PixelCertificate> proof = SolveInRounds(
-          model, other_options, is_own ? SolveMethod::kJoint : summary->method,
-          context, timer, &other.built, &*found, &way);
+      std::optional<PixelCertificate> proof =
+          SolveInRounds(other_run, &other.built, &*found, &way);
       if (way.cost_final < summary->cost_final) {
         *start = std::move(other);
         summary->init = start->init;

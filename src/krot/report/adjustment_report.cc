@@ -5,7 +5,6 @@
 #include <sstream>
 #include <vector>
 
-#include "krot/report/part_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/sentences.h"
 #include "krot/report/text_table.h"

@@ -1,6 +1,5 @@
 #include "krot/report/camera_report.h"
 #include "krot/report/pair_report.h"
-#include "krot/report/part_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/reports.h"
 

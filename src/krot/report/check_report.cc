@@ -7,7 +7,6 @@
 #include "krot/base/numbers.h"
 #include "krot/report/camera_report.h"
 #include "krot/report/pair_report.h"
-#include "krot/report/part_report.h"
 #include "krot/report/text_table.h"
 
 namespace krot::internal {

@@ -3,7 +3,6 @@
 #include <string>
 #include <utility>
 
-#include "krot/base/numbers.h"
 #include "krot/compare.h"
 #include "krot/report/report_json.h"
 #include "krot/report/reports.h"

@@ -7,7 +7,6 @@
 
 #include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
-#include "krot/report/part_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "krot/outliers/robust_start.h"
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 

@@ -1,9 +1,9 @@
-#include "krot/report/part_report.h"
+#include "krot/report/reports.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "krot/base/numbers.h"
+#include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
 namespace krot::internal {

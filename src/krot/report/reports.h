@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -8,11 +9,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "krot/analysis/model_comparison.h"
 #include "krot/analysis/model_input.h"
 #include "krot/analysis/model_parts.h"
 #include "krot/analysis/model_statistics.h"
-#include "krot/analysis/noise.h"
 #include "krot/check.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/model.h"
@@ -134,6 +133,18 @@ std::string CheckTable(const CheckReport& report, int max_rows);
 
 // report.json; docs/cli.md lists its keys. What is not known is null.
 std::string CheckJson(const CheckReport& report);
+
+// For example "0.0123"; "anywhere" if nothing holds the image.
+std::string SigmaText(double sigma);
+
+// What too few tracks tie to the rest of a model; "" if all is tied.
+std::string PartsSentence(const ModelCheck& check);
+std::string PartTable(const ModelCheck& check, size_t max_rows);
+nlohmann::ordered_json PartsJson(const ModelCheck& check);
+
+// What the model still has that no adjustment mends, and what helps: a line for
+// each; "" if there is nothing.
+std::string LastingFaultLines(const LastingFaults& faults);
 
 // How two models differ: `krot model_comparer`.
 struct ComparisonReport {

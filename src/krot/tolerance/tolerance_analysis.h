@@ -181,20 +181,11 @@ LengthRange FindLength(const ToleranceProblem& problem,
 // given. This is what `krot tolerance_analyzer` does between reading and
 // writing.
 
-struct ToleranceOptions {
-  double max_error = 0;     // epsilon, pixels; > 0
-  double tolerance = 0.01;  // of an end, relative to how far it is; > 0
-  // Indices in Model::images and Model::points3D whose boxes are wanted.
-  std::vector<int32_t> images;
-  std::vector<int32_t> points;
+struct ToleranceOptions : ToleranceRequest {
   // Distances whose least and greatest length are wanted. The first with metres
   // is the scale bar: all lengths are in metres then, and otherwise in scene
   // units.
   std::vector<KnownDistance> distances;
-  // The indices of two images that hold place and scale. Empty: what
-  // solve.problem.fixed marks does or, if that is nothing, two images are
-  // chosen.
-  std::vector<int32_t> gauge_images;
   // Options of the problem, and of the solve that finds an estimate within the
   // bound if the model is none.
   SolveModelOptions solve;
