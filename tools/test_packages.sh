@@ -10,7 +10,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 ((EUID == 0)) || die "a bare Debian is made as root"
 bare=$1/bookworm
 
-install_missing debootstrap:debootstrap lintian:lintian
+install_missing git:git debootstrap:debootstrap lintian:lintian
 "$root/tools/make_packages.sh"
 lintian --tag-display-limit 0 "$root"/build-packages/*.deb
 
