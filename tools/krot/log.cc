@@ -65,6 +65,7 @@ class ProgressLine {
   void Leave();
   void LeaveStage();
   void Print(const std::string& addition);
+  void Rewrite(const std::string& line);
   double Pause() const;
   void StartWatching();
   void Watch();
@@ -84,6 +85,7 @@ class ProgressLine {
   bool is_printed_ = false;    // the present words are
   bool says_seconds_ = false;  // after the words
   bool line_is_open_ = false;  // on a terminal
+  size_t num_shown_ = 0;       // columns of the open line
 };
 
 void ProgressLine::Show(const LogOptions& options, const Progress& progress) {
@@ -144,7 +146,13 @@ void ProgressLine::Leave() {
   if (is_active_ && !is_printed_) Print("");
   if (!line_is_open_) return;
   if (!is_phase_ && says_seconds_) Print("");
-  Write(is_phase_ ? "\r\033[K" : "\n");  // a phase leaves no line
+  if (is_phase_) {  // leaves no line
+    Rewrite("");
+    Write("\r");
+  } else {
+    Write("\n");
+  }
+  num_shown_ = 0;
   line_is_open_ = false;
 }
 
@@ -161,10 +169,8 @@ void ProgressLine::Print(const std::string& addition) {
   Progress whole = progress_;
   whole.words += addition;
   if (is_terminal_) {
-    // Goes back to the margin, and erases what is left of a longer line.
     constexpr int kUsual = 80;
-    const int columns = TerminalColumns().value_or(kUsual);
-    Write('\r' + FitProgress(whole, columns) + "\033[K");
+    Rewrite(FitProgress(whole, TerminalColumns().value_or(kUsual)));
     line_is_open_ = true;
   } else {
     Write(whole.words + '\n');
@@ -172,6 +178,14 @@ void ProgressLine::Print(const std::string& addition) {
   printed_ = Clock::now();
   is_printed_ = true;
   says_seconds_ = !addition.empty();
+}
+
+// Goes back to the margin, and writes spaces over what is left of a longer
+// line: not every console knows the sequence that erases it.
+void ProgressLine::Rewrite(const std::string& line) {
+  const size_t num_left = num_shown_ - std::min(num_shown_, line.size());
+  Write('\r' + line + std::string(num_left, ' '));
+  num_shown_ = line.size();
 }
 
 // Seconds between two lines, or two states of one.

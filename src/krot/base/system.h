@@ -108,7 +108,7 @@ int64_t PeakMemoryBytes();
 // ---- The terminal ----
 
 bool IsStderrTerminal();
-// Whether control sequences can rewrite its lines.
+// Whether it is one on which a return begins its line anew.
 bool CanRewriteLines();
 std::optional<int> TerminalColumns();
 

@@ -279,13 +279,7 @@ bool IsStderrTerminal() {
   return ::GetConsoleMode(StderrHandle(), &mode) != 0;
 }
 
-bool CanRewriteLines() {
-  const DWORD sequences = 0x0004;  // ENABLE_VIRTUAL_TERMINAL_PROCESSING
-  DWORD mode = 0;
-  return ::GetConsoleMode(StderrHandle(), &mode) != 0 &&
-         ((mode & sequences) != 0 ||
-          ::SetConsoleMode(StderrHandle(), mode | sequences) != 0);
-}
+bool CanRewriteLines() { return IsStderrTerminal(); }
 
 std::optional<int> TerminalColumns() {
   CONSOLE_SCREEN_BUFFER_INFO info;
