@@ -203,8 +203,7 @@ class CameraChecker {
       nodes.push_back(2 * FrameOf(row));
       nodes.push_back(2 * FrameOf(row) + 1);
     }
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    SortUnique(&nodes);
     // Rows of G are contiguous.
     Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> G(
         3, 3 * static_cast<Index>(nodes.size()));
@@ -343,7 +342,8 @@ class CameraChecker {
   Index num_columns_ = 0;
   double least_exponent_ = 0;
   double length_ = 1;  // the median distance of a point from a camera
-  // The reduced system: T = F'C, the last column F'e, D and g as above.
+  // The system without the points: T = F'C and its last column F'e, D = C'C and
+  // g = C'e; without the poses, too, once Reduce is done.
   MatrixXd T_, D_;
   VectorXd g_;
 };
