@@ -370,6 +370,28 @@ TEST(FindWeakLinks, SaysThatTracksLeftOutHoldNothing) {
   EXPECT_GT(links[0].scale_factor, 5);
 }
 
+// No track of two says how large a group of frames is, but all of them do.
+TEST(FindWeakLinks, AreHeldByManyTracksOfTwo) {
+  SceneOptions options = Scene(0, 0);
+  options.num_frames = 40;
+  options.num_points = 4000;
+  options.track_length = 2;
+  const BuiltProblem built =
+      BuildProblem(SynthesizeScene(options).ground_truth, {});
+  const auto all_are_held = [&](const Estimate& estimate) {
+    const std::vector<char> all(built.problem.observations.size(), 1);
+    const std::vector<WeakLink> links =
+        FindWeakLinks(built.problem, estimate, all, 8, {});
+    EXPECT_GT(links.size(), 1u);
+    return std::all_of(links.begin(), links.end(),
+                       [](const WeakLink& link) { return link.IsHeld(); });
+  };
+  EXPECT_TRUE(all_are_held(built.start));
+  Estimate torn = built.start;
+  for (int32_t f = 0; f < 10; ++f) torn.translations[f] *= 1.5;
+  EXPECT_FALSE(all_are_held(torn));
+}
+
 // A fifth of the tracks has no wrong observation.
 TEST(FindWeakLinks, AreHeldWhereAsManyTracksAreWrongElsewhere) {
   int num_links = 0;

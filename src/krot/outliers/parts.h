@@ -181,6 +181,9 @@ class PlaceSearch {
           return BestPoint(track, place).second < kCutOff * variance_;
         });
   }
+  // The standard deviation of a scale, with the shift and all points free, to
+  // first order; infinite if the tracks that agree do not hold it.
+  double ScaleDeviation(const Place& place) const;
   // Three standard deviations, squared: costs that rise by less are no worse.
   double no_worse() const { return 9 * variance_; }
 
@@ -211,6 +214,8 @@ class PlaceSearch {
                                                const Place& place) const;
   std::vector<const SharedTrack*> TracksWithPoints() const;
   static Eigen::Matrix3d WeightOf(const SharedTrack& track, double scale);
+  std::pair<Eigen::Matrix4d, Eigen::Vector4d> NormalOfPlace(
+      const Place& place) const;
   Place BestPlace(double scale) const;
   Place Improve(const Place& place, bool is_scale_free) const;
   Place ImproveAll(Place place, bool is_scale_free) const;

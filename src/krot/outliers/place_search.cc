@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -101,9 +102,11 @@ std::pair<Vector3d, double> PlaceSearch::BestPoint(const SharedTrack& track,
   return best;
 }
 
-// A step of Gauss-Newton in the shift, the points of the tracks that agree and,
-// if it is free, the scale.
-Place PlaceSearch::Improve(const Place& place, bool is_scale_free) const {
+// The normal equations of a step of Gauss-Newton in the shift, the scale and
+// the points of the tracks that agree, points eliminated; in the coordinates of
+// Unit.
+std::pair<Matrix4d, Vector4d> PlaceSearch::NormalOfPlace(
+    const Place& place) const {
   const Unit unit(tracks_);
   Matrix4d S = Matrix4d::Zero();
   Vector4d rhs = Vector4d::Zero();
@@ -121,9 +124,14 @@ Place PlaceSearch::Improve(const Place& place, bool is_scale_free) const {
     S += moves.transpose() * (b.H - H_b_M * b.H) * moves;
     rhs += moves.transpose() * (b.g - H_b_M * (a.g + b.g));
   }
+  return {S, rhs};
+}
+
+Place PlaceSearch::Improve(const Place& place, bool is_scale_free) const {
+  const auto [S, rhs] = NormalOfPlace(place);
   Place moved = place;
   if (is_scale_free) {
-    const Place step = unit.PlaceOf(InverseOf<4>(S) * rhs);
+    const Place step = Unit(tracks_).PlaceOf(InverseOf<4>(S) * rhs);
     moved.shift += step.shift;
     moved.scale += step.scale;
     if (!(moved.scale > 0)) return place;
@@ -132,6 +140,13 @@ Place PlaceSearch::Improve(const Place& place, bool is_scale_free) const {
   }
   moved.cost = Cost(moved, place.cost);
   return moved;
+}
+
+double PlaceSearch::ScaleDeviation(const Place& place) const {
+  const Matrix4d S = NormalOfPlace(place).first;
+  if (!(S.trace() > 0)) return std::numeric_limits<double>::infinity();
+  const double variance = variance_ * InverseOf<4>(S)(3, 3);
+  return Unit(tracks_).PlaceOf(Vector4d::Unit(3)).scale * std::sqrt(variance);
 }
 
 // For every track (t - x_a + scale x_b)' W (...) is to be small, with t the

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <numeric>
 #include <optional>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -290,8 +291,9 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
       MinimizeAndJoin(problem, norm, level, context, &whole);
   if (!of_parts) return whole;
   const auto rank = [&](const Estimate& estimate, int32_t num_parts) {
-    return std::make_pair(num_parts,
-                          -NumAgreeing(problem, estimate, norm, cap));
+    return std::make_tuple(!(MedianError(problem, estimate, norm) <= cap),
+                           num_parts,
+                           -NumAgreeing(problem, estimate, norm, cap));
   };
   return std::move(rank(whole, num_untied_of_whole) <
                            rank(*of_parts, num_untied)

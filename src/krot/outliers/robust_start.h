@@ -77,9 +77,9 @@ Eigen::Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i);
 //      what the others do not tie is joined anew, and frames and points that
 //      hardly agree are placed anew, while that makes more observations agree;
 //   7. if parts are left that nothing ties, though enough tracks cross or most
-//      errors are far above the bound, all is placed as one part, too, and
-//      the start is taken with fewer such parts or, if there are as many,
-//      with which more observations agree.
+//      errors are far above the bound, all is placed as one part, too. The
+//      start is taken of which most errors are below the bound, then the one
+//      with fewer such parts, then the one with which more observations agree.
 //
 // Errors above `level`, pixels, count as wrong there. Depths are positive but
 // for those of outliers.

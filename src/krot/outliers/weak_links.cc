@@ -96,11 +96,13 @@ class Joiner {
   }
 
  private:
-  std::vector<Side> SidesOf(const std::vector<int32_t>& points, int32_t group) {
+  // What some frames (marked) say about points, which each of them sees.
+  std::vector<Side> SidesOf(const std::vector<int32_t>& points,
+                            const std::vector<char>& frames) {
     std::vector<int64_t> observations;
     for (const int32_t k : points) {
       for (const int64_t i : problem_.OfPoint(k)) {
-        if (group_of_[problem_.FrameOf(i)] == group) observations.push_back(i);
+        if (frames[problem_.FrameOf(i)]) observations.push_back(i);
       }
     }
     const ProblemSubset part(problem_, observations);
@@ -132,29 +134,38 @@ class Joiner {
     return sides;
   }
 
-  // The tracks that both groups see and that say something about the scale;
-  // *num_shared is how many both see in all.
-  std::vector<SharedTrack> TracksOf(const GroupPair& pair,
-                                    int64_t* num_shared) {
+  std::vector<char> FramesOf(int32_t group) const {
+    std::vector<char> frames(problem_.num_frames);
+    for (int32_t f = 0; f < problem_.num_frames; ++f) {
+      frames[f] = group_of_[f] == group;
+    }
+    return frames;
+  }
+
+  // The tracks that frames of a and b (marked) see, with at least `min_seen`
+  // observations on one side; *num_shared is how many both see in all.
+  std::vector<SharedTrack> TracksOf(const std::vector<char>& of_a,
+                                    const std::vector<char>& of_b,
+                                    size_t min_seen, int64_t* num_shared) {
     std::vector<int32_t> points;
     for (int32_t k = 0; k < problem_.num_points; ++k) {
       bool has_a = false, has_b = false;
       for (const int64_t i : problem_.OfPoint(k)) {
-        has_a |= group_of_[problem_.FrameOf(i)] == pair.a;
-        has_b |= group_of_[problem_.FrameOf(i)] == pair.b;
+        has_a |= of_a[problem_.FrameOf(i)] != 0;
+        has_b |= of_b[problem_.FrameOf(i)] != 0;
       }
       if (has_a && has_b) points.push_back(k);
     }
     *num_shared = static_cast<int64_t>(points.size());
-    std::vector<Side> a = SidesOf(points, pair.a);
-    std::vector<Side> b = SidesOf(points, pair.b);
+    std::vector<Side> a = SidesOf(points, of_a);
+    std::vector<Side> b = SidesOf(points, of_b);
     std::vector<SharedTrack> tracks;
     for (size_t n = 0; n < points.size(); ++n) {
       const size_t least =
           std::min(a[n].observations.size(), b[n].observations.size());
       const size_t most =
           std::max(a[n].observations.size(), b[n].observations.size());
-      if (least >= 1 && most >= 2) {
+      if (least >= 1 && most >= min_seen) {
         tracks.push_back({std::move(a[n]), std::move(b[n])});
       }
     }
@@ -196,7 +207,9 @@ class Joiner {
     if (!a_is_metric && HasBaselineIn(pair.b)) std::swap(pair.a, pair.b);
     const bool is_scale_free = !HasBaselineIn(pair.b);
     WeakLink link;
-    const std::vector<SharedTrack> all = TracksOf(pair, &link.num_tracks);
+    // A track that one frame of each group sees proposes no scale.
+    const std::vector<SharedTrack> all =
+        TracksOf(FramesOf(pair.a), FramesOf(pair.b), 2, &link.num_tracks);
     link.num_telling = static_cast<int64_t>(all.size());
     link.usual_share = usual_share_;
     std::vector<SharedTrack> some;
@@ -252,9 +265,33 @@ class Joiner {
       if (group_of_[f] == pair.a) of_a.push_back(f);
       if (group_of_[f] == pair.b) of_b.push_back(f);
     }
-    link.frames = of_b.size() <= of_a.size() ? of_b : of_a;
+    const bool is_b_smaller = of_b.size() <= of_a.size();
+    link.frames = is_b_smaller ? of_b : of_a;
+    if (!may_move_ && !link.IsHeld()) {
+      AskAllTracks(FramesOf(is_b_smaller ? pair.b : pair.a), &link);
+    }
     Unite(pair, best);
     return link;
+  }
+
+  // Whether a group is held by all others together, where two groups alone do
+  // not say so. Tracks of two count as well: each gives one equation, and many
+  // of them hold a scale, too. No other scales are searched, so that most
+  // tracks must agree with the estimate's own.
+  void AskAllTracks(const std::vector<char>& group, WeakLink* link) {
+    std::vector<char> others;
+    for (const char is_own : group) others.push_back(is_own == 0);
+    WeakLink of_all = *link;
+    std::vector<SharedTrack> all =
+        TracksOf(others, group, 1, &of_all.num_tracks);
+    of_all.num_telling = static_cast<int64_t>(all.size());
+    const PlaceSearch tracks(problem_, estimate_, sigma_, std::move(all));
+    of_all.num_agreeing = tracks.NumAgreeing(Place());
+    of_all.scale_factor = 1 + 3 * tracks.ScaleDeviation(Place());
+    of_all.turn_deg = 0;
+    if (2 * of_all.num_agreeing > of_all.num_telling && of_all.IsHeld()) {
+      *link = std::move(of_all);
+    }
   }
 
   // Any three tracks agree at some turn. So twice as many must agree.
