@@ -83,19 +83,30 @@ double FromBits(uint64_t bits) {
 std::vector<double> GroupMedians(const std::vector<double>& values,
                                  const std::vector<int32_t>& group_of,
                                  int32_t num_groups, const Context& context) {
+  struct Candidate {
+    uint64_t bits;
+    int32_t group;
+  };
+  std::vector<Candidate> candidates;  // that have the bits found so far
+  candidates.reserve(values.size());
+  for (size_t n = 0; n < values.size(); ++n) {
+    if (group_of[n] < 0 || !std::isfinite(values[n]) || values[n] < 0) continue;
+    // This gives -0 the bits of 0.
+    candidates.push_back({BitsOf(std::abs(values[n])), group_of[n]});
+  }
   std::vector<uint64_t> found(num_groups, 0);  // the bits found so far
   // Values below the median among those with these bits.
   std::vector<int64_t> num_before(num_groups, -1);
   for (int shift = 64 - 8; shift >= 0; shift -= 8) {
     std::vector<int64_t> counts(static_cast<size_t>(num_groups) * kNumDigits);
-    for (size_t n = 0; n < values.size(); ++n) {
-      const int32_t group = group_of[n];
-      if (group < 0 || !std::isfinite(values[n]) || values[n] < 0) continue;
-      // This gives -0 the bits of 0.
-      const uint64_t digits = BitsOf(std::abs(values[n])) >> shift;
-      if (digits >> 8 != found[group]) continue;
-      ++counts[group * kNumDigits + (digits & (kNumDigits - 1))];
+    size_t num_left = 0;
+    for (const Candidate candidate : candidates) {
+      const uint64_t digits = candidate.bits >> shift;
+      if (digits >> 8 != found[candidate.group]) continue;
+      ++counts[candidate.group * kNumDigits + (digits & (kNumDigits - 1))];
+      candidates[num_left++] = candidate;
     }
+    candidates.resize(num_left);
     ReduceRanks(context, std::plus<int64_t>(), &counts);
     for (int32_t group = 0; group < num_groups; ++group) {
       const int64_t* count = &counts[group * kNumDigits];

@@ -333,17 +333,24 @@ bool Reprojection::TakeRows(const Estimate& estimate, int num_threads,
                             KnownRotationProblem* problem) const {
   if (is_linear_) return true;
   TakePositionRows(built_, estimate, problem);
+  const std::vector<AffineMap> cameras =
+      CamerasFromWorld(built_.problem, estimate.translations);
   const auto count = static_cast<int64_t>(problem->observations.size());
   std::atomic<bool> do_project{true};
   ParallelForEach(count, num_threads, [&](int64_t i) {
     if (!built_.HasPixel(i)) return;
     Observation& observation = problem->observations[i];
     const Intrinsics& source = sources_[observation.view];
-    const auto row =
-        RowAtProjection(source, built_.pixels[i], InCamera(estimate, i));
+    const AffineMap& camera = cameras[observation.view];
+    const Vector3d x_cam =
+        camera.leftCols<3>() * estimate.points[observation.point] +
+        camera.col(3);
+    const auto row = RowAtProjection(source, built_.pixels[i], x_cam);
     if (row) {
       observation.E = *row;
-      observation.E.bottomRows<2>() /= built_.ScaleOf(i);
+      if (!built_.scales.empty()) {
+        observation.E.bottomRows<2>() /= built_.ScaleOf(i);
+      }
     } else {
       do_project = false;
     }

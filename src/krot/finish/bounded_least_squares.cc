@@ -135,7 +135,7 @@ class BoundedPath {
 
   struct State {
     Estimate x;
-    std::vector<ViewedError> viewed;
+    std::vector<ViewedError<Cap>> viewed;
     double cost = 0;     // 1/2 sum rho
     double barrier = 0;  // -sum log(h_j(e) / h_j(0))
   };
@@ -154,30 +154,38 @@ class BoundedPath {
     struct Totals {
       double least;  // slack
       double cost;
+      // The sum of the logarithms of relative slacks is log_slacks and that of
+      // `slacks`, a product, as one logarithm takes as long as all the rest.
       double log_slacks;
+      double slacks;
     };
+    const std::vector<AffineMap> cameras =
+        CamerasFromWorld(problem_, state->x.translations);
     const Totals totals = system_.loop().Reduce(
-        Totals{std::numeric_limits<double>::infinity(), 0, 0},
+        Totals{std::numeric_limits<double>::infinity(), 0, 0, 1},
         [&](int64_t i) -> Totals {
+          const Observation& o = problem_.observations[i];
           const ViewedPoint viewed =
-              ViewPoint(problem_, problem_.observations[i], state->x);
-          if (!(viewed.depth > 0)) return {-1, 0, 0};
+              ViewPoint(cameras[o.view], o, state->x.points[o.point]);
+          if (!(viewed.depth > 0)) return {-1, 0, 0, 1};
           const Eigen::Vector2d e = viewed.v / viewed.depth;
-          state->viewed[i] = {e, viewed.depth};
           const Vector h = system_.cap().Slacks(e);
-          if (!(h.minCoeff() > 0)) return {-1, 0, 0};
-          const double loss = problem_.observations[i].view < NumViews()
-                                  ? options_.loss.Value(e.squaredNorm())
-                                  : 0;
-          return {h.minCoeff(), loss / 2,
-                  std::log(system_.cap().RelativeSlack(h))};
+          state->viewed[i] = {e, viewed.depth, h};
+          if (!(h.minCoeff() > 0)) return {-1, 0, 0, 1};
+          const double loss =
+              o.view < NumViews() ? options_.loss.Value(e.squaredNorm()) : 0;
+          return {h.minCoeff(), loss / 2, 0, system_.cap().RelativeSlack(h)};
         },
         [](const Totals& a, const Totals& b) {
-          return Totals{std::min(a.least, b.least), a.cost + b.cost,
-                        a.log_slacks + b.log_slacks};
+          Totals sum{std::min(a.least, b.least), a.cost + b.cost,
+                     a.log_slacks + b.log_slacks, a.slacks * b.slacks};
+          if (sum.slacks < 1e-100) {
+            sum.log_slacks += std::log(std::exchange(sum.slacks, 1));
+          }
+          return sum;
         });
     state->cost = totals.cost;
-    state->barrier = -totals.log_slacks;
+    state->barrier = -(totals.log_slacks + std::log(totals.slacks));
     return totals.least > 0 && std::isfinite(state->cost);
   }
 
@@ -199,7 +207,7 @@ class BoundedPath {
     const Vector least =
         least_slack * system_.cap().Slacks(Eigen::Vector2d::Zero());
     const double gap = system_.loop().Sum([&](int64_t i) {
-      const Vector h = system_.cap().Slacks(now_.viewed[i].e);
+      const Vector& h = now_.viewed[i].h;
       multipliers_[i] = mu * h.cwiseMax(least).cwiseInverse();
       return multipliers_[i].dot(h);
     });
@@ -222,7 +230,7 @@ class BoundedPath {
   void MoveMultipliers() {
     const double gap = system_.loop().Sum([&](int64_t i) {
       Vector& l = multipliers_[i];
-      const Vector h = system_.cap().Slacks(trial_.viewed[i].e);
+      const Vector& h = trial_.viewed[i].h;
       const Vector centred = target_mu_ * h.cwiseInverse();
       l = (l + system_.StepOf(i).dl)
               .cwiseMax(0.3 * centred)

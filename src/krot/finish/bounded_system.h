@@ -21,7 +21,7 @@ namespace krot::internal {
 //   Slacks         h_j > 0 inside
 //   Normals        n_j = -dh_j/de, as columns
 //   kBend          -d^2 h_j / de^2 = kBend I
-//   MaxStep        the largest t <= limit with e + t d inside
+//   MaxStep        the largest t <= limit with e + t d inside; h = Slacks(e)
 //   RelativeSlack  of slacks h_j, the product of all h_j / h_j(0)
 // Share          of multipliers: their weight, where an error's own is 1
 
@@ -41,9 +41,9 @@ struct DiscCap {
     return e;
   }
   // The positive root of |d|^2 t^2 + 2 e'd t = 2 h, without cancellation.
-  double MaxStep(const Eigen::Vector2d& e, const Eigen::Vector2d& d,
-                 double limit) const {
-    const double h2 = 2 * Slacks(e)[0];
+  double MaxStep(const Eigen::Vector2d& e, const Vector& h,
+                 const Eigen::Vector2d& d, double limit) const {
+    const double h2 = 2 * h[0];
     const double b = e.dot(d);
     const double root = std::sqrt(b * b + d.squaredNorm() * h2);
     const double t = b > 0 ? h2 / (b + root) : (root - b) / d.squaredNorm();
@@ -75,9 +75,8 @@ struct PolygonCap {
   const Eigen::Matrix<double, 2, kNum>& Normals(const Eigen::Vector2d&) const {
     return normals;
   }
-  double MaxStep(const Eigen::Vector2d& e, const Eigen::Vector2d& d,
-                 double limit) const {
-    const Vector h = Slacks(e);
+  double MaxStep(const Eigen::Vector2d&, const Vector& h,
+                 const Eigen::Vector2d& d, double limit) const {
     const Vector fall = normals.transpose() * d;
     for (int j = 0; j < kNum; ++j) {
       if (fall[j] * limit > h[j]) limit = h[j] / fall[j];
@@ -93,10 +92,12 @@ struct PolygonCap {
   Eigen::Matrix<double, 2, kNum> normals;
 };
 
-// An observation's error e = v / w, pixels, and its depth w.
+// An observation's error e = v / w, pixels, its depth w, and Slacks(e).
+template <typename Cap>
 struct ViewedError {
   Eigen::Vector2d e;
   double depth;
+  typename Cap::Vector h;
 };
 
 // The Newton system of bounded least squares at an iterate, in pixels. With
@@ -121,6 +122,7 @@ template <typename Cap>
 class BoundedSystem {
  public:
   using Vector = typename Cap::Vector;
+  using Viewed = ViewedError<Cap>;
   using Vector2d = Eigen::Vector2d;
   using Vector3d = Eigen::Vector3d;
 
@@ -144,13 +146,13 @@ class BoundedSystem {
 
   // Builds the system at an iterate; errors and multipliers must outlive the
   // calls below. False if there is no factor.
-  bool Factorize(const std::vector<ViewedError>& viewed,
+  bool Factorize(const std::vector<Viewed>& viewed,
                  const std::vector<Vector>& multipliers) {
     viewed_ = &viewed;
     multipliers_ = &multipliers;
     loop_.ForEach([&](int64_t i) {
       const Observation& o = problem_.observations[i];
-      const ViewedError& at = viewed[i];
+      const Viewed& at = viewed[i];
       const Root U = root_[i] = RootOf(i);
       const double scale = 1 / at.depth;
       const Eigen::RowVector3d Jx = scale * (o.E.row(1) - at.e[0] * o.E.row(0));
@@ -197,7 +199,7 @@ class BoundedSystem {
     const Vector& l = (*multipliers_)[i];
     const Correction c = CorrectionOf(i);
     PairStep step;
-    step.h = cap_.Slacks(e);
+    step.h = (*viewed_)[i].h;
     step.dh = -(cap_.Normals(e).transpose() * d_[i].template head<2>()) -
               Vector::Constant(c.slack);
     step.dl = (Vector::Constant(mu_) - c.product - l.cwiseProduct(step.dh))
@@ -260,7 +262,7 @@ class BoundedSystem {
   Root RootOf(int64_t i) const {
     const Vector2d& e = (*viewed_)[i].e;
     const Vector& l = (*multipliers_)[i];
-    const Vector h = cap_.Slacks(e);
+    const Vector& h = (*viewed_)[i].h;
     const Vector stiffness = l.cwiseQuotient(h);
     const Eigen::Matrix<double, 2, Cap::kNum> n = cap_.Normals(e);
     const double own = WeightOf(i) + Cap::kBend * l.sum();
@@ -289,7 +291,7 @@ class BoundedSystem {
     const Vector target =
         Vector::Constant(mu_) - c.product + c.slack * (*multipliers_)[i];
     return WeightOf(i) * e +
-           cap_.Normals(e) * target.cwiseQuotient(cap_.Slacks(e));
+           cap_.Normals(e) * target.cwiseQuotient((*viewed_)[i].h);
   }
 
   // A step t takes the depth to w + t dw and the error along de by
@@ -300,8 +302,9 @@ class BoundedSystem {
     const double furthest = limit == kFurthest
                                 ? kFurthest / (1 + kFurthest * dw)
                                 : std::numeric_limits<double>::infinity();
+    const Viewed& at = (*viewed_)[i];
     const double a =
-        cap_.MaxStep((*viewed_)[i].e, d_[i].template head<2>(), furthest);
+        cap_.MaxStep(at.e, at.h, d_[i].template head<2>(), furthest);
     return a < furthest ? a / (1 - a * dw) : limit;
   }
 
@@ -316,20 +319,20 @@ class BoundedSystem {
     double* const rows = d_.empty() ? nullptr : d_[0].data();
     // The next step corrects the direction's error in the energy norm.
     least_squares_.Solve(nullptr, rows, /*tolerance=*/1e-3, &dx_, rows);
-    loop_.ForEach([&](int64_t i) {
-      Vector3d& d = d_[i];
-      const Root& U = root_[i];
-      d[1] /= U.c;
-      d[0] = (d[0] - U.b * d[1]) / U.a;
-      d[2] /= U.depth;
-    });
     reach_ = FollowDirection();
   }
 
-  Reach FollowDirection() const {
+  // Turns the solution's image in d_ into steps of the errors, and follows
+  // them.
+  Reach FollowDirection() {
     return loop_.Reduce(
         Reach{kFurthest, kFurthest, 0, 0, 0, 0},
         [&](int64_t i) {
+          Vector3d& d = d_[i];
+          const Root& U = root_[i];
+          d[1] /= U.c;
+          d[0] = (d[0] - U.b * d[1]) / U.a;
+          d[2] /= U.depth;
           const PairStep step = StepOf(i);
           const Vector& l = (*multipliers_)[i];
           Reach reach = {ReachOf(i),          kFurthest,
@@ -359,7 +362,7 @@ class BoundedSystem {
   const BlockStructure structure_;
   const std::vector<Eigen::Matrix3d> rig_from_world_;
   CentredLeastSquares<3> least_squares_;
-  const std::vector<ViewedError>* viewed_ = nullptr;
+  const std::vector<Viewed>* viewed_ = nullptr;
   const std::vector<Vector>* multipliers_ = nullptr;
   double mu_ = 0;
   bool is_corrected_ = false;

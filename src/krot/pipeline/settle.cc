@@ -63,9 +63,10 @@ class Settling {
                                     is_loose_frame_, context_);
     RestoreGaugeIfHarmless(problem_, built_.start, options_.norm, context_,
                            &estimate_, &is_held_frame_);
-    const std::vector<double> distances = TypicalDistances();
+    std::vector<double> distances;
     for (int32_t f = 0; f < problem_.num_frames; ++f) {
       if (is_loose_frame_[f] == 0) continue;
+      if (distances.empty()) distances = TypicalDistances();
       MoveLooseFrame(f, distances[components_.of_frame[f]]);
     }
   }
@@ -271,8 +272,7 @@ class Settling {
         const double distance = distances[components_.of_frame[frames[n]]];
         shifts.push_back(sign * distance * rays[n]);
       }
-      const std::vector<char> as_good =
-          AreAsGood(frames, shifts, limits, kInfinity);
+      const auto as_good = AreAsGood(frames, shifts, limits, kInfinity);
       for (size_t n = 0; n < frames.size(); ++n) {
         is_loose_frame_[frames[n]] |= as_good[n];
       }

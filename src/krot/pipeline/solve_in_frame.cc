@@ -270,7 +270,8 @@ SolveModelResult SolveInFrame(const Model& model,
   Start start = ChooseStart(model, options, summary.method, context);
   summary.init = start.init;
   CountProblem(model, start.built, context, &summary);
-  summary.pixel_error_before = Summarize(PixelErrors(model, num_threads));
+  std::vector<double> before_px = PixelErrors(model, num_threads);
+  summary.pixel_error_before = Summarize(before_px);
   summary.pixel_error_after = summary.pixel_error_before;
   summary.seconds_build = build_timer.Seconds();
   if (options.on_built) options.on_built(summary);
@@ -328,8 +329,9 @@ SolveModelResult SolveInFrame(const Model& model,
   const double level = MaxOfRanks(
       context, reprojection.TrueCost(estimate, options.norm, num_threads));
   result.model = ApplyEstimate(model, start.built, estimate);
-  const std::vector<double> before_px =
-      PixelErrors(model, num_threads, options.norm);
+  if (options.norm.p != 2) {
+    before_px = PixelErrors(model, num_threads, options.norm);
+  }
   CarryLeftOutPoints(model, before_px, options.norm, start.built,
                      options.problem.fixed, level, &result.model);
   std::vector<double> after_px =

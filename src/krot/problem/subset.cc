@@ -276,17 +276,15 @@ void UniteRanks(Ranks* ranks, std::vector<char>* is_seen,
   }
 }
 
-// Components of the graph that has only these edges.
-Components FindComponentsOf(const KnownRotationProblem& problem,
-                            const std::vector<int64_t>& observations,
-                            const Context& context) {
+// Components of the graph that has only these edges: the observations with the
+// indices index_of(n), n < count.
+template <typename IndexOf>
+Components FindComponentsOf(const KnownRotationProblem& problem, int64_t count,
+                            const IndexOf& index_of, const Context& context) {
   const auto point_of = [&](int64_t n) {
-    return problem.observations[observations[n]].point;
+    return problem.observations[index_of(n)].point;
   };
-  const auto frame_of = [&](int64_t n) {
-    return problem.views[problem.observations[observations[n]].view].frame;
-  };
-  const int64_t count = static_cast<int64_t>(observations.size());
+  const auto frame_of = [&](int64_t n) { return problem.FrameOf(index_of(n)); };
 
   // Two frames are connected if they see the same point.
   DisjointSets frames(problem.num_frames);
@@ -314,26 +312,27 @@ Components FindComponentsOf(const KnownRotationProblem& problem,
   return components;
 }
 
-std::vector<int64_t> All(const KnownRotationProblem& problem) {
-  return NumbersUpTo<int64_t>(
-      static_cast<int64_t>(problem.observations.size()));
-}
-
 }  // namespace
 
 Components FindComponents(const KnownRotationProblem& problem,
                           const Context& context) {
-  return FindComponentsOf(problem, All(problem), context);
+  return FindComponentsOf(
+      problem, static_cast<int64_t>(problem.observations.size()),
+      [](int64_t n) { return n; }, context);
 }
 
 std::vector<std::vector<int64_t>> SplitIntoComponents(
     const KnownRotationProblem& problem) {
-  return SplitIntoComponents(problem, All(problem));
+  return SplitIntoComponents(
+      problem,
+      NumbersUpTo<int64_t>(static_cast<int64_t>(problem.observations.size())));
 }
 
 std::vector<std::vector<int64_t>> SplitIntoComponents(
     const KnownRotationProblem& problem, std::vector<int64_t> observations) {
-  const Components components = FindComponentsOf(problem, observations, {});
+  const Components components =
+      FindComponentsOf(problem, static_cast<int64_t>(observations.size()),
+                       [&](int64_t n) { return observations[n]; }, {});
   std::vector<std::vector<int64_t>> split(components.count);
   if (components.count == 1) {
     split[0] = std::move(observations);
