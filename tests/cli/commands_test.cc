@@ -5,11 +5,8 @@
 namespace krot::internal {
 namespace {
 
-using ::testing::HasSubstr;
-
 TEST(Krot, PrintsItsVersion) {
-  const KrotResult result = RunKrot({"--version"});
-  EXPECT_EQ(result.exit_code, 0);
+  const KrotResult result = Succeeded(RunKrot({"--version"}));
   EXPECT_EQ(result.out, "krot " KROT_VERSION "\n");
 }
 
@@ -26,8 +23,7 @@ TEST(Krot, ListsCommandsAndExitCodesWhenAskedForHelp) {
 }
 
 TEST(Krot, ExplainsACommandInEitherManner) {
-  const KrotResult result = RunKrot({"solver", "-h"});
-  EXPECT_EQ(result.exit_code, 0);
+  const KrotResult result = Succeeded(RunKrot({"solver", "-h"}));
   EXPECT_EQ(result.err, "");
   EXPECT_THAT(result.out, HasSubstr("--Solver.norm"));
   EXPECT_EQ(RunKrot({"help", "solver"}).out, result.out);
@@ -35,9 +31,8 @@ TEST(Krot, ExplainsACommandInEitherManner) {
 }
 
 TEST(Krot, NamesTheNearestCommandForAnUnknownOne) {
-  const KrotResult result = RunKrot({"slover"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, IsOneSentence("krot", "did you mean solver?"));
+  EXPECT_THAT(RunKrot({"slover"}),
+              IsRefused(1, "krot", "did you mean solver?"));
   EXPECT_EQ(RunKrot({"help", "mapper"}).exit_code, 1);
   EXPECT_EQ(RunKrot({""}).exit_code, 1);
 }

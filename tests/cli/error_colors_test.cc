@@ -20,18 +20,14 @@ class ErrorColors : public ::testing::Test {
  protected:
   ErrorColors() { Save(SmallLegacyModel(), folder_ / "model"); }
 
-  KrotResult Analyze(const std::vector<std::string>& more) const {
-    std::vector<std::string> arguments = {"model_analyzer", "--path",
-                                          folder_ / "model"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+  KrotResult Analyze(const Words& more) const {
+    return RunKrot({"model_analyzer", "--path", folder_ / "model"}, more);
   }
 
-  void ExpectRefused(const std::vector<std::string>& more, int exit_code,
+  void ExpectRefused(const Words& more, int exit_code,
                      const std::string& part) const {
     const KrotResult result = Analyze(more);
-    EXPECT_EQ(result.exit_code, exit_code);
-    EXPECT_THAT(result.err, IsOneSentence("krot model_analyzer", part));
+    EXPECT_THAT(result, IsRefused(exit_code, "krot model_analyzer", part));
     EXPECT_EQ(result.out, "");
   }
 
@@ -40,9 +36,8 @@ class ErrorColors : public ::testing::Test {
 
 TEST_F(ErrorColors, AreThoseOfTheLargestErrorOfEachTrack) {
   WriteBytes(folder_ / "model/project.ini", "image_path=photos\n");
-  const KrotResult result = Analyze(
-      {"--error_colors_path", folder_ / "copy", "--error_colors_top", "2.5"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(Analyze(
+      {"--error_colors_path", folder_ / "copy", "--error_colors_top", "2.5"}));
   EXPECT_EQ(result.out, Analyze({}).out);
   EXPECT_EQ(ReadBytes(folder_ / "copy/project.ini"), "image_path=photos\n");
 
@@ -55,7 +50,7 @@ TEST_F(ErrorColors, AreThoseOfTheLargestErrorOfEachTrack) {
 
 TEST_F(ErrorColors, AreReadByColmap) {
   if (!HasColmap()) GTEST_SKIP() << "colmap is not installed";
-  ASSERT_EQ(Analyze({"--error_colors_path", folder_ / "copy"}).exit_code, 0);
+  Succeeded(Analyze({"--error_colors_path", folder_ / "copy"}));
   fs::create_directory(folder_ / "text");
   ASSERT_TRUE(
       RunColmap({"model_converter", "--input_path", folder_ / "copy",
@@ -87,10 +82,8 @@ TEST_F(ErrorColors, AreRefusedWhereTheyHaveNoPlace) {
 
   Save(SmallLegacyModel(), folder_ / "copy");
   ExpectRefused({"--error_colors_path", folder_ / "copy"}, 5, "overwrite");
-  EXPECT_EQ(Analyze({"--error_colors_path", folder_ / "copy",  //
-                     "--overwrite", "1"})
-                .exit_code,
-            0);
+  Succeeded(Analyze({"--error_colors_path", folder_ / "copy",  //
+                     "--overwrite", "1"}));
 }
 
 }  // namespace

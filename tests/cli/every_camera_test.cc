@@ -5,7 +5,6 @@
 #include <unordered_map>
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "krot/camera/camera_model.h"
 #include "tests/cli/colmap.h"
@@ -24,18 +23,16 @@ class EveryCameraOfCommands : public ::testing::TestWithParam<int> {
   }
   // Wide: up to 81 degrees off the axis, or all around.
   void SynthesizeAndSolve() const {
-    const KrotResult made = RunKrot(
-        {"model_synthesizer", "--output_path", folder_ / "input",
-         "--Scene.camera_model", ModelName(), "--Scene.focal_length_factor",
-         "0.5", "--Scene.num_frames", "6", "--Scene.num_points", "60",
-         "--Scene.track_length", "4", "--Scene.pixel_noise", "1",
-         "--Scene.start_point_noise", "0.01"});
-    ASSERT_EQ(made.exit_code, 0) << made.err;
-    const KrotResult solved =
+    Succeeded(RunKrot({"model_synthesizer", "--output_path", folder_ / "input",
+                       "--Scene.camera_model", ModelName(),
+                       "--Scene.focal_length_factor", "0.5",
+                       "--Scene.num_frames", "6", "--Scene.num_points", "60",
+                       "--Scene.track_length", "4", "--Scene.pixel_noise", "1",
+                       "--Scene.start_point_noise", "0.01"}));
+    Succeeded(
         RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
                  folder_ / "output", "--report_path", folder_ / "report.json",
-                 "--certificate_path", folder_ / "certificate.json"});
-    ASSERT_EQ(solved.exit_code, 0) << solved.err;
+                 "--certificate_path", folder_ / "certificate.json"}));
   }
 
   TempFolder folder_;
@@ -55,14 +52,12 @@ INSTANTIATE_TEST_SUITE_P(Models, EveryCameraOfColmap,
 
 TEST_P(EveryCameraOfCommands, IsSynthesizedSolvedAndCertified) {
   SynthesizeAndSolve();
-  const auto report = nlohmann::json::parse(ReadBytes(folder_ / "report.json"));
+  const auto report = ReadJson(folder_ / "report.json");
   EXPECT_EQ(report["termination"], "gap_reached");
   EXPECT_EQ(report["certified"], true);
   EXPECT_LT(report["cost_final"], report["cost_initial"].get<double>());
-  EXPECT_EQ(RunKrot({"certificate_checker", "--input_path", folder_ / "output",
-                     "--certificate_path", folder_ / "certificate.json"})
-                .exit_code,
-            0);
+  Succeeded(RunKrot({"certificate_checker", "--input_path", folder_ / "output",
+                     "--certificate_path", folder_ / "certificate.json"}));
 }
 
 TEST_P(EveryCameraOfColmap, HasTheErrorsThatColmapFinds) {

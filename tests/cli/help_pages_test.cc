@@ -12,12 +12,9 @@
 namespace krot::internal {
 namespace {
 
-using ::testing::HasSubstr;
-
-std::vector<std::string> Matches(const std::string& text,
-                                 const std::string& pattern) {
+Words Matches(const std::string& text, const std::string& pattern) {
   const std::regex regex(pattern);
-  std::vector<std::string> matches;
+  Words matches;
   for (std::sregex_iterator it(text.begin(), text.end(), regex), end; it != end;
        ++it) {
     matches.push_back((*it)[1]);
@@ -48,12 +45,11 @@ std::string Completed(const std::string& words) {
 
 TEST(HelpPages, TheManualHoldsEveryOptionOfEveryCommand) {
   const std::string manual = RunKrot({"--help=man"}).out;
-  const std::vector<std::string> commands =
-      Matches(manual, R"(\.BR krot\\-(\S+))");
+  const Words commands = Matches(manual, R"(\.BR krot\\-(\S+))");
   EXPECT_GE(commands.size(), 8);
   for (const std::string& command : commands) {
     const std::string page = RunKrot({command, "--help=man"}).out;
-    const std::vector<std::string> options =
+    const Words options =
         Matches(RunKrot({command, "--help"}).out, R"(\n  --([^\s,]+)\n)");
     EXPECT_GE(options.size(), 3) << command;
     for (const std::string& option : options) {
@@ -76,9 +72,8 @@ TEST(HelpPages, AFileIsLeftToTheShell) {
 }
 
 TEST(HelpPages, AnUnknownFormatIsRefused) {
-  const KrotResult result = RunKrot({"solver", "--help=html"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, IsOneSentence("krot solver", "--help = html"));
+  EXPECT_THAT(RunKrot({"solver", "--help=html"}),
+              IsRefused(1, "krot solver", "--help = html"));
 }
 
 }  // namespace

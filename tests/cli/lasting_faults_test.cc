@@ -15,8 +15,6 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::EndsWith;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 // What no adjustment mends is said by the commands that adjust and describe,
 // and what they advise helps.
@@ -30,15 +28,13 @@ class LastingFaultsOfAModel : public ::testing::Test {
   }
 
   // What bundle_adjuster says of model_, and then model_analyzer of the result.
-  std::vector<std::string> WhatIsSaid() const {
+  Words WhatIsSaid() const {
     Save(model_, folder_ / "input");
     const KrotResult adjusted =
-        RunKrot({"bundle_adjuster", "--input_path", folder_ / "input",
-                 "--output_path", folder_ / "adjusted"});
-    EXPECT_EQ(adjusted.exit_code, 0) << adjusted.err;
+        Succeeded(RunKrot({"bundle_adjuster", "--input_path", folder_ / "input",
+                           "--output_path", folder_ / "adjusted"}));
     const KrotResult analyzed =
-        RunKrot({"model_analyzer", "--path", folder_ / "adjusted"});
-    EXPECT_EQ(analyzed.exit_code, 0) << analyzed.err;
+        Succeeded(RunKrot({"model_analyzer", "--path", folder_ / "adjusted"}));
     return {adjusted.out, analyzed.out};
   }
 
@@ -108,10 +104,8 @@ TEST_F(LastingFaultsOfAModel, PointsInACameraAreCountedAndThenRemoved) {
               HasSubstr("\n1 observation sees a point that lies in the camera "
                         "itself, which no adjustment mends: krot model_checker "
                         "--output_path, or krot outlier_filter, removes it."));
-  const KrotResult cured =
-      RunKrot({"model_checker", "--input_path", folder_ / "adjusted",
-               "--output_path", folder_ / "cured"});
-  EXPECT_EQ(cured.exit_code, 0) << cured.err;
+  Succeeded(RunKrot({"model_checker", "--input_path", folder_ / "adjusted",
+                     "--output_path", folder_ / "cured"}));
   EXPECT_THAT(RunKrot({"model_analyzer", "--path", folder_ / "cured"}).out,
               Not(HasSubstr("in the camera itself")));
 }

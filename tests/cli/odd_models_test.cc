@@ -5,7 +5,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
@@ -17,19 +16,16 @@
 namespace krot::internal {
 namespace {
 
-using ::testing::HasSubstr;
-using Words = std::vector<std::string>;
-
 class OddModels : public ::testing::Test {
  protected:
   // Runs the command on "input" into "output".
-  KrotResult Run(Words words) const {
-    words.insert(words.end(), {"--input_path", folder_ / "input"});
+  KrotResult Run(const Words& words) const {
+    Words paths = {"--input_path", folder_ / "input"};
     if (words[0] != "tolerance_analyzer" && words[0] != "model_analyzer") {
-      words.insert(words.end(),
-                   {"--output_path", folder_ / "output", "--overwrite", "1"});
+      paths = paths +
+              Words{"--output_path", folder_ / "output", "--overwrite", "1"};
     }
-    return RunKrot(words);
+    return RunKrot(words, paths);
   }
 
   TempFolder folder_;
@@ -61,14 +57,12 @@ TEST_F(OddModels, With2DPointsThatAreNaNGiveTheResultsOfThoseWithout) {
     for (const Words& command : kCommands) {
       SCOPED_TRACE(command[0]);
       Save(model, folder_ / "input", format);
-      const KrotResult plain = Run(command);
-      ASSERT_EQ(plain.exit_code, 0) << plain.err;
+      Succeeded(Run(command));
       const bool writes = std::filesystem::exists(folder_ / "output");
       const Model expected =
           writes ? With2DPointsThatAreNaN(Load(folder_ / "output")) : Model();
       Save(With2DPointsThatAreNaN(model), folder_ / "input", format);
-      const KrotResult result = Run(command);
-      ASSERT_EQ(result.exit_code, 0) << result.err;
+      const KrotResult result = Succeeded(Run(command));
       EXPECT_THAT(result.err,
                   HasSubstr(": 6 2D points in no track whose coordinates are "
                             "not finite: kept as read, and left out"));
@@ -105,15 +99,13 @@ TEST_F(OddModels, WithAnImageOfNoPoseGiveTheResultsOfThoseWithout) {
       for (const Words& command : kCommands) {
         SCOPED_TRACE(command[0]);
         Save(model, folder_ / "input");
-        const KrotResult plain = Run(command);
-        ASSERT_EQ(plain.exit_code, 0) << plain.err;
+        Succeeded(Run(command));
         const bool writes = std::filesystem::exists(folder_ / "output");
         const Model expected =
             writes ? WithUnregisteredImage(Load(folder_ / "output"), pose)
                    : Model();
         Save(WithUnregisteredImage(model, pose), folder_ / "input");
-        const KrotResult result = Run(command);
-        ASSERT_EQ(result.exit_code, 0) << result.err;
+        const KrotResult result = Succeeded(Run(command));
         EXPECT_EQ(result.err.find(": 1 image without a rotation, so without a "
                                   "pose: kept as read") != std::string::npos,
                   !HasRotation(pose.quaternion_wxyz))
@@ -139,8 +131,7 @@ TEST_F(OddModels, WithObservationsInAnImageOfNoRotationLeaveThemOut) {
                       return element.image_id == model.images[0].id;
                     });
   for (const char* init : {"model", "feasible"}) {
-    const KrotResult result = Run({"solver", "--Solver.init", init});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+    const KrotResult result = Succeeded(Run({"solver", "--Solver.init", init}));
     EXPECT_THAT(result.out,
                 HasSubstr("no_pose " + std::to_string(num_observations)));
     EXPECT_EQ(Load(folder_ / "output").images[0].cam_from_world.quaternion_wxyz,
@@ -153,8 +144,7 @@ TEST_F(OddModels, FarAwayKeepAnImageOfNoRotation) {
   const Pose zeros{{0, 0, 0, 0}, {0, 0, 0}};
   Save(WithUnregisteredImage(FarAway(SmallLegacyModel(), {4e6, 3e6, 0}), zeros),
        folder_ / "input");
-  const KrotResult result = Run({"solver"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(Run({"solver"}));
   const Model after = Load(folder_ / "output");
   EXPECT_EQ(after.images.back().cam_from_world.translation,
             Eigen::Vector3d::Zero());
@@ -164,22 +154,20 @@ TEST_F(OddModels, FarAwayKeepAnImageOfNoRotation) {
 TEST_F(OddModels, WithAWrongObservationPointToTheOutlierFilter) {
   Model model = SmallLegacyModel();
   Save(model, folder_ / "input");
-  const KrotResult sound = Run({"solver"});
-  EXPECT_EQ(sound.exit_code, 0);
-  EXPECT_THAT(sound.err, ::testing::Not(HasSubstr("outlier_filter")));
+  const KrotResult sound = Succeeded(Run({"solver"}));
+  EXPECT_THAT(sound.err, Not(HasSubstr("outlier_filter")));
   const TrackElement& element = model.track_elements[5];
   const auto image =
       std::find_if(model.images.begin(), model.images.end(),
                    [&](const Image& i) { return i.id == element.image_id; });
   image->points2D[element.point2D_idx].x += 300;
   Save(model, folder_ / "input");
-  const KrotResult result = Run({"solver"});
-  EXPECT_EQ(result.exit_code, 0);
+  const KrotResult result = Succeeded(Run({"solver"}));
   EXPECT_THAT(result.err, HasSubstr("warning: the mean error has risen from "));
   EXPECT_THAT(result.err, HasSubstr("krot outlier_filter removes them"));
   // Where they are removed there is nothing to say.
   const KrotResult filtered = Run({"solver", "--Solver.max_error", "4"});
-  EXPECT_THAT(filtered.err, ::testing::Not(HasSubstr("mean error has risen")));
+  EXPECT_THAT(filtered.err, Not(HasSubstr("mean error has risen")));
 }
 
 // Its observations are right, only its position is not: it comes back, and does
@@ -191,17 +179,14 @@ TEST_F(OddModels, WithACameraFarAwayIsNamedAndTheOthersKeepTheirPlace) {
     pose->translation *= 1e5;
   }
   Save(model, folder_ / "input");
-  for (Words command : {Words{"solver"}, Words{"outlier_filter"}}) {
+  for (const Words& command :
+       {Words{"solver"},
+        Words{"outlier_filter", "--OutlierFilter.max_error", "3"}}) {
     SCOPED_TRACE(command[0]);
-    if (command[0] == "outlier_filter") {
-      command.insert(command.end(), {"--OutlierFilter.max_error", "3"});
-    }
-    command.insert(command.end(), {"--report_path", folder_ / "r.json"});
-    const KrotResult result = Run(command);
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const KrotResult result =
+        Succeeded(Run(command + Words{"--report_path", folder_ / "r.json"}));
     if (command[0] == "solver") {
-      const nlohmann::json not_held =
-          nlohmann::json::parse(ReadBytes(folder_ / "r.json"))["not_held"];
+      const Json not_held = ReadJson(folder_ / "r.json")["not_held"];
       ASSERT_EQ(not_held["images"].size(), 1);
       EXPECT_EQ(not_held["images"][0]["image_id"], model.images[3].id);
       EXPECT_THAT(result.out, HasSubstr("1 image moved farther than cameras"));
