@@ -217,16 +217,13 @@ TEST(TriangulateMatches, TakesOfTwoKeypointsOfAnImageTheNearerOne) {
 TEST(TriangulateMatches, DependsOnNoOrderAndNoNumberOfThreads) {
   const Model truth = MatchedScene(1);
   Database database = DatabaseOf(truth);
-  Context one, three;
-  one.num_threads = 1;
-  three.num_threads = 3;
-  const Model a = TriangulateMatches(PosesOf(truth), database, {}, one).model;
+  const Model a = TriangulateMatches(PosesOf(truth), database, {}, {1}).model;
   std::mt19937 random(2);
   std::shuffle(database.pairs.begin(), database.pairs.end(), random);
   for (VerifiedPair& pair : database.pairs) {
     std::shuffle(pair.matches.begin(), pair.matches.end(), random);
   }
-  const Model b = TriangulateMatches(PosesOf(truth), database, {}, three).model;
+  const Model b = TriangulateMatches(PosesOf(truth), database, {}, {3}).model;
   EXPECT_THAT(b, IsModel(a));
 }
 
