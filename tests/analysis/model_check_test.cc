@@ -32,9 +32,9 @@ using ::testing::IsEmpty;
 
 Model Scene(int seed, int num_frames = 12, double track_length = 4,
             double pixel_noise = 1) {
-  SceneOptions options = SceneOf(num_frames, 600, track_length, pixel_noise);
-  options.random_seed = static_cast<uint64_t>(seed);
-  return SynthesizeScene(options).ground_truth;
+  return SynthesizeScene(
+             SceneOf(num_frames, 600, track_length, pixel_noise, seed))
+      .ground_truth;
 }
 
 Frame& FrameOf(Model* model, size_t image) {

@@ -21,11 +21,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-SceneOptions SmallScene(int seed) {
-  SceneOptions options = SceneOf(10, 150, 4, 1);
-  options.random_seed = static_cast<uint64_t>(seed);
-  return options;
-}
+SceneOptions SmallScene(int seed) { return SceneOf(10, 150, 4, 1, seed); }
 
 // The observations as they are, at the true cameras and points.
 Model Scene(const SceneOptions& options) {

@@ -114,9 +114,7 @@ TEST(ExplainContradictions, ThatEndsEarlyIsAnExplanationAndSaysSo) {
 
 // Exact poses, noise of half a pixel, cameras with a lens.
 Model Scene() {
-  SceneOptions options = SceneOf(12, 1500, 6, 0.5);
-  options.random_seed = 3;
-  return SynthesizeScene(options).ground_truth;
+  return SynthesizeScene(SceneOf(12, 1500, 6, 0.5, 3)).ground_truth;
 }
 
 // Turns an image about its centre by an angle in degrees, and moves it.

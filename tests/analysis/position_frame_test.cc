@@ -90,12 +90,7 @@ class Town {
 };
 
 std::string RefusalOf(const Town& town) {
-  try {
-    town.Find();
-  } catch (const ModelError& error) {
-    return error.what();
-  }
-  return "";
+  return ModelErrorOf([&] { town.Find(); });
 }
 
 struct Counts {

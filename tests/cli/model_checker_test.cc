@@ -23,8 +23,7 @@ using ::testing::StartsWith;
 class ModelCheckerCommand : public ::testing::Test {
  protected:
   ModelCheckerCommand() {
-    SceneOptions options = SceneOf(8, 400, 6, 0.5);
-    options.random_seed = 3;
+    SceneOptions options = SceneOf(8, 400, 6, 0.5, 3);
     Model model = SynthesizeScene(options).ground_truth;
     Save(model, folder_ / "sound");
     Pose& pose = model.frames[2].rig_from_world;

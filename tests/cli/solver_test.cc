@@ -432,7 +432,7 @@ TEST_F(Commands, ModelSynthesizerMakesWhatItsOptionsSay) {
   for (std::string word; words >> word;) arguments.push_back(word);
   Succeeded(RunKrot(arguments));
 
-  SceneOptions options = SceneOf(7, 90, 3, 0.3);
+  SceneOptions options = SceneOf(7, 90, 3, 0.3, 5);
   options.layout = SceneLayout::kStreet;
   options.camera_model_id = 4;
   options.image_width = 800;
@@ -446,7 +446,6 @@ TEST_F(Commands, ModelSynthesizerMakesWhatItsOptionsSay) {
   options.start_translation_noise = 0.01;
   options.start_point_noise = 0.02;
   options.rotation_noise_deg = 0.1;
-  options.random_seed = 5;
   const SyntheticScene scene = SynthesizeScene(options);
   EXPECT_THAT(Load(folder_ / "start"), IsModel(scene.model));
   EXPECT_THAT(Load(folder_ / "truth"), IsModel(scene.ground_truth));

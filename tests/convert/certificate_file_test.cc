@@ -20,6 +20,7 @@
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
 #include "tests/convert/pixel_optimum.h"
+#include "tests/testing/model_matchers.h"
 #include "tests/testing/scene_of.h"
 
 namespace krot::internal {
@@ -30,10 +31,9 @@ using ::testing::HasSubstr;
 using Json = nlohmann::ordered_json;
 
 Model MakeModel(int sensors_per_rig, uint64_t seed = 1) {
-  SceneOptions options = SceneOf(6, 60, 6, 0.7);
+  SceneOptions options = SceneOf(6, 60, 6, 0.7, seed);
   options.has_rigs = sensors_per_rig > 1;
   options.sensors_per_rig = sensors_per_rig;
-  options.random_seed = seed;
   return SynthesizeScene(options).model;
 }
 
@@ -291,12 +291,7 @@ class WrongCertificateFile : public ::testing::Test {
   }
 
   static std::string MessageOf(const std::string& text) {
-    try {
-      ParseCertificate(text, "c.json");
-    } catch (const ModelError& error) {
-      return error.what();
-    }
-    return "none";
+    return ModelErrorOf([&] { ParseCertificate(text, "c.json"); });
   }
 
   Solved solved_ = Solve(MakeModel(1), Norm::L2());

@@ -112,10 +112,9 @@ TEST(SolveJoint, ProvesTheOptimumOfModelsWithGrossOutliers) {
     for (const unsigned seed : {1u, 2u, 3u}) {
       SCOPED_TRACE(testing::Message()
                    << static_cast<int>(layout) << ", seed " << seed);
-      SceneOptions scene = SceneOf(8, 200, 4, 0.5);
+      SceneOptions scene = SceneOf(8, 200, 4, 0.5, seed);
       scene.layout = layout;
       scene.outlier_ratio = 0.02;
-      scene.random_seed = seed;
       const BuiltProblem built = BuildProblem(SynthesizeScene(scene).model, {});
       JointOptions options;
       options.relative_gap = 1e-4;

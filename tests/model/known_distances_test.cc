@@ -12,6 +12,7 @@
 
 #include "krot/context.h"
 #include "tests/model/tiny_model.h"
+#include "tests/testing/model_matchers.h"
 
 namespace krot::internal {
 namespace {
@@ -25,12 +26,7 @@ std::vector<KnownDistance> Read(const Model& model, const std::string& text,
 
 std::string RefusalOf(const Model& model, const std::string& text,
                       bool may_lack_metres = false) {
-  try {
-    Read(model, text, may_lack_metres);
-  } catch (const ModelError& error) {
-    return error.what();
-  }
-  return "";
+  return ModelErrorOf([&] { Read(model, text, may_lack_metres); });
 }
 
 TEST(ReadDistances, TakesImagesAndPointsByTheirNames) {

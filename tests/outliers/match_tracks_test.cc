@@ -25,9 +25,7 @@ using ::testing::IsEmpty;
 using Track = std::vector<std::pair<ImageId, uint32_t>>;
 
 Model MatchedScene(double pixel_noise = 0) {
-  SceneOptions options = SceneOf(10, 800, 5, pixel_noise);
-  options.random_seed = 4;
-  return SynthesizeScene(options).ground_truth;
+  return SynthesizeScene(SceneOf(10, 800, 5, pixel_noise, 4)).ground_truth;
 }
 
 Model PosesOf(Model model) {

@@ -22,9 +22,8 @@ namespace {
 using Eigen::Vector3d;
 
 SceneOptions SmallNoisyScene(uint64_t seed, int camera_model_id) {
-  SceneOptions options = SceneOf(6, 40, 4, 0.5);
+  SceneOptions options = SceneOf(6, 40, 4, 0.5, seed);
   options.camera_model_id = camera_model_id;
-  options.random_seed = seed;
   return options;
 }
 
