@@ -19,9 +19,8 @@ const Context kOneThread{1};
 
 // The lowest maximum of a noisy scene, where least squares cannot stay.
 Model NoisyScene(int sensors_per_rig = 1) {
-  SceneOptions options = SceneOf(8, 80, 5, 1);
+  SceneOptions options = SceneOf(8, 80, 5, 1, 9);
   options.sensors_per_rig = sensors_per_rig;
-  options.random_seed = 9;
   return SolveModel(SynthesizeScene(options).model, {}).model;
 }
 

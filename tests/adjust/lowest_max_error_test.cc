@@ -18,11 +18,7 @@ namespace {
 
 const Context kLowerAlone{1};
 
-SceneOptions NoisyOptions() {
-  SceneOptions options = SceneOf(8, 80, 5, 1);
-  options.random_seed = 9;
-  return options;
-}
+SceneOptions NoisyOptions() { return SceneOf(8, 80, 5, 1, 9); }
 
 AdjustModelOptions Lowered() {
   AdjustModelOptions options;

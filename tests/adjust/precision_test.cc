@@ -33,10 +33,9 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 Model PreciseScene(int camera_model_id, int sensors_per_rig = 2) {
-  SceneOptions options = SceneOf(4, 25, sensors_per_rig == 1 ? 3.5 : 5, 1);
+  SceneOptions options = SceneOf(4, 25, sensors_per_rig == 1 ? 3.5 : 5, 1, 5);
   options.camera_model_id = camera_model_id;
   options.sensors_per_rig = sensors_per_rig;
-  options.random_seed = 5;
   return SynthesizeScene(options).ground_truth;
 }
 
@@ -567,8 +566,7 @@ TEST(Precision, CoversTheTruthAsOftenAsItSays) {
   int focals_within = 0;
   double squares = 0, redundancy = 0;
   for (int seed = 0; seed < kScenes; ++seed) {
-    SceneOptions scene = SceneOf(6, 60, 4, kNoise);
-    scene.random_seed = seed;
+    SceneOptions scene = SceneOf(6, 60, 4, kNoise, seed);
     const Model truth = SynthesizeScene(scene).ground_truth;
     BundleAdjustmentOptions options;
     options.function_tolerance = 1e-10;
@@ -624,10 +622,9 @@ TEST(Precision, CoversTheTruthAsOftenAsItSays) {
 
 // Noise of 0.7 px, and a start that is off.
 SyntheticScene NoisyScene(int num_frames, int num_points, int seed) {
-  SceneOptions options = SceneOf(num_frames, num_points, 5, 0.7);
+  SceneOptions options = SceneOf(num_frames, num_points, 5, 0.7, seed);
   options.start_translation_noise = 0.002;
   options.start_point_noise = 0.002;
-  options.random_seed = seed;
   return SynthesizeScene(options);
 }
 

@@ -12,11 +12,10 @@ namespace krot::internal {
 // A noisy scene of two sensors per rig: the blocks of its start, and a cap
 // somewhat above their largest error.
 inline AdjustmentBlocks SmallBlocks(int camera_model_id, uint64_t seed = 3) {
-  SceneOptions options = SceneOf(4, 12, 5, 1);
+  SceneOptions options = SceneOf(4, 12, 5, 1, seed);
   options.camera_model_id = camera_model_id;
   options.sensors_per_rig = 2;
   options.start_point_noise = 1e-3;
-  options.random_seed = seed;
   const Model model = SynthesizeScene(options).model;
   AdjustmentBlocks blocks = MakeAdjustmentBlocks(model, 2);
   const double max_error = Summarize(PixelErrors(model, 1)).max;

@@ -52,7 +52,7 @@ Pose& PlaceOf(Model* model, size_t sensor) {
 TEST(FindWrongCameras, FindsNoneWhereThereIsNothingButNoise) {
   for (int seed = 1; seed <= 20; ++seed) {
     const Model model = RigScene(seed, 4 + seed, 600, 1 + seed % 4);
-    EXPECT_THAT(CheckModel(model, {}, {}).cameras, IsEmpty());
+    EXPECT_THAT(CheckModel(model).cameras, IsEmpty());
   }
 }
 
@@ -69,7 +69,7 @@ TEST(FindWrongCameras, FindsNoneWhereACameraIsNoisier) {
         point.y += more(generator);
       }
     }
-    EXPECT_THAT(CheckModel(model, {}, {}).cameras, IsEmpty());
+    EXPECT_THAT(CheckModel(model).cameras, IsEmpty());
   }
 }
 
@@ -81,7 +81,7 @@ TEST(FindWrongCameras, FindsACameraThatIsTurnedInItsRig) {
     const Vector3d turn =
         degrees / 180 * std::acos(-1.0) * Vector3d(1, 2, -1).normalized();
     place = Turned(place, turn, Vector3d::Zero());
-    const ModelCheck check = CheckModel(model, {}, {});
+    const ModelCheck check = CheckModel(model);
     ASSERT_THAT(check.cameras, SizeIs(1)) << degrees;
     EXPECT_EQ(check.cameras[0].camera_id,
               model.rigs[0].sensors[1].sensor_id.id);
@@ -97,7 +97,7 @@ TEST(FindWrongCameras, FindsACameraThatIsTurnedInItsRig) {
 TEST(FindWrongCameras, FindsTheDistortionOfOneOfTwoCameras) {
   Model model = RigScene(1, 20, 1000, 2);
   model.cameras[1].params[3] += 0.1;
-  const ModelCheck check = CheckModel(model, {}, {});
+  const ModelCheck check = CheckModel(model);
   ASSERT_THAT(check.cameras, SizeIs(1));
   EXPECT_EQ(check.cameras[0].camera_id, model.cameras[1].id);
   EXPECT_EQ(check.cameras[0].fault, CameraFault::kDistortion);

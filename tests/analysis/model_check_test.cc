@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <random>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -20,6 +21,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/dense_algebra.h"
+#include "tests/testing/edit_model.h"
 #include "tests/testing/scene_of.h"
 
 namespace krot::internal {
@@ -30,9 +32,9 @@ using ::testing::IsEmpty;
 
 Model Scene(int seed, int num_frames = 12, double track_length = 4,
             double pixel_noise = 1) {
-  SceneOptions options = SceneOf(num_frames, 600, track_length, pixel_noise);
-  options.random_seed = static_cast<uint64_t>(seed);
-  return SynthesizeScene(options).ground_truth;
+  return SynthesizeScene(
+             SceneOf(num_frames, 600, track_length, pixel_noise, seed))
+      .ground_truth;
 }
 
 Frame& FrameOf(Model* model, size_t image) {
@@ -49,12 +51,6 @@ void Turn(Model* model, size_t image, double degrees,
   pose = ToPose({turn * pose.Rotation(), turn * pose.translation});
 }
 
-Point2D& Pixel(Model* model, uint64_t e) {
-  const TrackElement& element = model->track_elements[e];
-  return model->images[ImageIndices(*model).at(element.image_id)]
-      .points2D[element.point2D_idx];
-}
-
 std::vector<ImageId> Images(const ModelCheck& check, ImageVerdict verdict) {
   std::vector<ImageId> ids;
   for (const ImageCheck& image : check.images) {
@@ -67,7 +63,7 @@ TEST(CheckModel, FindsNothingWrongWhereThereIsNothingButNoise) {
   int num_alarms = 0;
   for (int seed = 1; seed <= 20; ++seed) {
     const Model model = Scene(seed, 6 + seed, 2 + 0.2 * seed);
-    const ModelCheck check = CheckModel(model, {}, {});
+    const ModelCheck check = CheckModel(model);
     EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty());
     num_alarms += check.IsAnythingWrong();
   }
@@ -85,8 +81,7 @@ TEST(CheckModel, DoesNotCallAnImageWrongForNoiseThreeTimesAsLarge) {
         point.y += std::sqrt(8.0) * noise(random);
       }
     }
-    EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
-                IsEmpty());
+    EXPECT_THAT(Images(CheckModel(model), ImageVerdict::kWrong), IsEmpty());
   }
 }
 
@@ -101,8 +96,7 @@ TEST(CheckModel, DoesNotCallANoisyImageWrongForKeepingFewOfIts2DPoints) {
       point.y += std::sqrt(3.0) * noise(random);
     }
     points.resize(10 * points.size(), Point2D{});
-    EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
-                IsEmpty());
+    EXPECT_THAT(Images(CheckModel(model), ImageVerdict::kWrong), IsEmpty());
   }
 }
 
@@ -115,7 +109,7 @@ TEST(CheckModel, FindsTurnedImagesAndBlamesNoNeighbour) {
     for (const size_t n : {3, 4}) {
       Turn(&model, n, 1, {normal(random), normal(random), normal(random)});
     }
-    const ModelCheck check = CheckModel(model, {}, {});
+    const ModelCheck check = CheckModel(model);
     EXPECT_THAT(Images(check, ImageVerdict::kWrong),
                 ElementsAre(model.images[3].id, model.images[4].id));
     EXPECT_LE(check.observations.size(), 2u);
@@ -132,7 +126,7 @@ TEST(CheckModel, FindsAnImageWhoseObservationsAgreeOnAnotherPose) {
   for (int seed = 1; seed <= 10; ++seed) {
     Model model = Scene(seed, 12, 6);
     Turn(&model, 5, 0.2, {1, 2, 0});
-    const ModelCheck check = CheckModel(model, {}, {});
+    const ModelCheck check = CheckModel(model);
     EXPECT_THAT(Images(check, ImageVerdict::kWrong),
                 ElementsAre(model.images[5].id));
     EXPECT_EQ(check.images[5].fault, ImageFault::kMisplaced);
@@ -144,14 +138,7 @@ TEST(CheckModel, FindsAMisplacedImageByItsFewObservations) {
   for (int seed = 1; seed <= 10; ++seed) {
     Model model = Scene(seed, 12, 6);
     Turn(&model, 5, 0.2, {1, 2, 0});
-    std::vector<char> is_removed(model.track_elements.size(), 0);
-    int num_kept = 0;
-    for (size_t e = 0; e < is_removed.size(); ++e) {
-      if (model.track_elements[e].image_id != model.images[5].id) continue;
-      is_removed[e] = num_kept++ >= 20;
-    }
-    model = RemoveObservations(model, is_removed).model;
-    const ModelCheck check = CheckModel(model, {}, {});
+    const ModelCheck check = CheckModel(WithFewObservationsOf(5, 20, model));
     EXPECT_THAT(Images(check, ImageVerdict::kWrong),
                 ElementsAre(model.images[5].id));
   }
@@ -159,13 +146,13 @@ TEST(CheckModel, FindsAMisplacedImageByItsFewObservations) {
 
 // Minimax solutions stand off their least squares by half of the noise.
 TEST(CheckModel, AsksForAnAdjustmentWhereMostImagesAreMisplaced) {
-  EXPECT_TRUE(CheckModel(Scene(1, 12, 6), {}, {}).is_adjusted);
+  EXPECT_TRUE(CheckModel(Scene(1, 12, 6)).is_adjusted);
   for (const double degrees : {0.06, 0.2}) {
     Model model = Scene(1, 12, 6);
     for (size_t n = 0; n < model.images.size(); ++n) {
       Turn(&model, n, degrees, {1, n % 2 == 0 ? -0.5 : 0.5, 0});
     }
-    const ModelCheck check = CheckModel(model, {}, {});
+    const ModelCheck check = CheckModel(model);
     EXPECT_FALSE(check.is_adjusted);
     EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty());
   }
@@ -230,10 +217,8 @@ TEST(CheckModel, DoesNotCallANoisyImageChanceThatOthersTookItsTracksFrom) {
     std::mt19937_64 random(seed);
     std::normal_distribution<double> noise;
     std::uniform_real_distribution<double> uniform;
-    std::vector<char> is_removed(model.track_elements.size(), 0);
-    int num_kept = 0;
-    for (uint64_t e = 0; e < is_removed.size(); ++e) {
-      Point2D& pixel = Pixel(&model, e);
+    for (uint64_t e = 0; e < model.track_elements.size(); ++e) {
+      Point2D& pixel = PixelOf(&model, e);
       if (model.track_elements[e].image_id != model.images[5].id) {
         // Some of any image are up to the 4 pixels that COLMAP filters to.
         if (uniform(random) < 0.01) pixel.x += 4;
@@ -241,10 +226,8 @@ TEST(CheckModel, DoesNotCallANoisyImageChanceThatOthersTookItsTracksFrom) {
       }
       pixel.x += noise(random);
       pixel.y += noise(random);
-      is_removed[e] = ++num_kept > 40;
     }
-    const ModelCheck check =
-        CheckModel(RemoveObservations(model, is_removed).model);
+    const ModelCheck check = CheckModel(WithFewObservationsOf(5, 40, model));
     EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty());
   }
 }
@@ -321,11 +304,11 @@ TEST(CheckModel, FindsAnImageThatFitsByChanceWithinFourPixels) {
         do {
           error = {uniform(random), uniform(random)};
         } while (error.norm() > 4);
-        Pixel(&model, e).x = pixel->x() + error.x();
-        Pixel(&model, e).y = pixel->y() + error.y();
+        PixelOf(&model, e).x = pixel->x() + error.x();
+        PixelOf(&model, e).y = pixel->y() + error.y();
       }
     }
-    const ModelCheck check = CheckModel(model, {}, {});
+    const ModelCheck check = CheckModel(model);
     EXPECT_THAT(Images(check, ImageVerdict::kWrong),
                 ElementsAre(model.images[5].id));
     EXPECT_EQ(check.images[5].fault, ImageFault::kChance);
@@ -337,8 +320,8 @@ TEST(CheckModel, SaysOfWrongObservationsWhoseTheyAreAndByHowMuch) {
   size_t k = 0;
   while (model.points3D[k].track_end - model.points3D[k].track_begin < 5) ++k;
   const uint64_t e = model.points3D[k].track_begin + 1;
-  Pixel(&model, e).x += 30;
-  const ModelCheck check = CheckModel(model, {}, {});
+  PixelOf(&model, e).x += 30;
+  const ModelCheck check = CheckModel(model);
   ASSERT_EQ(check.observations.size(), 1u);
   const WrongObservation& one = check.observations[0];
   EXPECT_EQ(one.element, e);
@@ -363,13 +346,13 @@ TEST(CheckModel, TellsATrackOfTwoPointsFromScatteredMistakes) {
     const int32_t n = indices.at(model.track_elements[e].image_id);
     const Camera& camera = model.cameras[images[n].camera];
     const auto pixel = ProjectPoint(camera, images[n].cam_from_world * other);
-    Pixel(&model, e).x = pixel->x();
-    Pixel(&model, e).y = pixel->y();
+    PixelOf(&model, e).x = pixel->x();
+    PixelOf(&model, e).y = pixel->y();
   }
   const Point3D& scattered = model.points3D[k + 1];
-  Pixel(&model, scattered.track_begin).x += 40;
-  Pixel(&model, scattered.track_begin + 1).y += 40;
-  const ModelCheck check = CheckModel(model, {}, {});
+  PixelOf(&model, scattered.track_begin).x += 40;
+  PixelOf(&model, scattered.track_begin + 1).y += 40;
+  const ModelCheck check = CheckModel(model);
   ASSERT_EQ(check.tracks.size(), 1u);
   EXPECT_EQ(check.tracks[0].point3D_id, point.id);
   EXPECT_EQ(check.tracks[0].num_second, 3);
@@ -382,7 +365,7 @@ TEST(CheckModel, TellsATrackOfTwoPointsFromScatteredMistakes) {
 // sees, from central differences of the projection.
 TEST(CheckModel, KnowsHowFirmlyAnImageIsHeld) {
   const Model model = Scene(3, 6, 3);
-  const ModelCheck check = CheckModel(model, {}, {});
+  const ModelCheck check = CheckModel(model);
   ASSERT_FALSE(check.IsAnythingWrong());
   const std::vector<ImageGeometry> images = ImageGeometries(model);
   const auto indices = ImageIndices(model);
@@ -441,17 +424,6 @@ TEST(CheckModel, KnowsHowFirmlyAnImageIsHeld) {
               1e-4 * one.turn_sigma_deg);
 }
 
-// Its tracks keep their other observations.
-Model WithFewObservationsOf(size_t image, int num_kept, const Model& model) {
-  int num = 0;
-  std::vector<char> is_removed;
-  for (const TrackElement& element : model.track_elements) {
-    is_removed.push_back(element.image_id == model.images[image].id &&
-                         ++num > num_kept);
-  }
-  return RemoveObservations(model, is_removed).model;
-}
-
 Eigen::Vector2d Position(const Point2D& point) { return {point.x, point.y}; }
 
 // The image keeps the observations nearest to one of its own.
@@ -467,25 +439,23 @@ Model WithObservationsInOneCorner(size_t image, size_t num_kept,
     distances.push_back(distance(point));
   }
   std::sort(distances.begin(), distances.end());
-  std::vector<char> is_removed;
-  for (const TrackElement& element : model.track_elements) {
-    is_removed.push_back(element.image_id == kept.id &&
-                         distance(kept.points2D[element.point2D_idx]) >=
-                             distances[num_kept]);
-  }
-  return RemoveObservations(model, is_removed).model;
+  return Without(model, [&](uint64_t e) {
+    const TrackElement& element = model.track_elements[e];
+    return element.image_id == kept.id &&
+           distance(kept.points2D[element.point2D_idx]) >= distances[num_kept];
+  });
 }
 
 TEST(CheckModel, CallsAnImageWeaklyHeldWhoseObservationsAreInOneCorner) {
   const Model model = WithObservationsInOneCorner(7, 17, Scene(4, 10, 5));
-  const ModelCheck check = CheckModel(model, {}, {});
+  const ModelCheck check = CheckModel(model);
   EXPECT_THAT(Images(check, ImageVerdict::kWeaklyHeld),
               ElementsAre(model.images[7].id));
   EXPECT_FALSE(check.IsAnythingWrong());
 }
 
 TEST(CheckModel, DoesNotCallTwoImagesWeaklyHeldWhoseDistanceIsTheUnit) {
-  const ModelCheck check = CheckModel(Scene(2, 2, 2), {}, {});
+  const ModelCheck check = CheckModel(Scene(2, 2, 2));
   EXPECT_EQ(check.NumImages(ImageVerdict::kFine), 2);
 }
 
@@ -514,9 +484,9 @@ TEST(CheckModel, CallsAnImageWrongThatIsWeaklyHeldAndContradicted) {
       int num = 0;
       for (size_t e = 0; e < model.track_elements.size(); ++e) {
         if (model.track_elements[e].image_id != id) continue;
-        if (++num * percent % 100 < percent) Pixel(&model, e).y += 40;
+        if (++num * percent % 100 < percent) PixelOf(&model, e).y += 40;
       }
-      const ModelCheck check = CheckModel(model, {}, {});
+      const ModelCheck check = CheckModel(model);
       if (percent < 45) {
         EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty()) << percent;
         continue;
@@ -531,7 +501,7 @@ TEST(CheckModel, CallsAnImageWrongThatIsWeaklyHeldAndContradicted) {
 TEST(CheckModel, CallsAnImageWrongThatNothingHolds) {
   for (const int num_kept : {0, 1, 4}) {
     const Model model = WithFewObservationsOf(7, num_kept, Scene(4, 10, 5));
-    const ModelCheck check = CheckModel(model, {}, {});
+    const ModelCheck check = CheckModel(model);
     EXPECT_THAT(Images(check, ImageVerdict::kWrong),
                 ElementsAre(model.images[7].id));
     EXPECT_EQ(check.images[7].fault, ImageFault::kUnsupported);
@@ -545,32 +515,20 @@ TEST(CheckModel, DoesNotCallAnImageWrongForHavingAWrongNeighbourAlone) {
   Model model = Scene(4, 10, 5);
   const ImageId wrong = model.images[7].id;
   const ImageId alone = model.images[6].id;
-  std::vector<char> is_removed;
+  std::map<Point3DId, std::set<ImageId>> images_of;
   for (const Point3D& point : model.points3D) {
-    bool sees_wrong = false;
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      sees_wrong |= model.track_elements[e].image_id == wrong;
-    }
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      is_removed.push_back(model.track_elements[e].image_id == alone &&
-                           !sees_wrong);
+    for (const TrackElement& element : TrackOf(model, point)) {
+      images_of[point.id].insert(element.image_id);
     }
   }
-  model = RemoveObservations(model, is_removed).model;
-  is_removed.clear();
-  for (const Point3D& point : model.points3D) {
-    bool sees_alone = false;
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      sees_alone |= model.track_elements[e].image_id == alone;
-    }
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      const ImageId id = model.track_elements[e].image_id;
-      is_removed.push_back(sees_alone && id != alone && id != wrong);
-    }
-  }
-  model = RemoveObservations(model, is_removed).model;
+  model = Without(model, [&](uint64_t e) {
+    const std::set<ImageId>& images = images_of[PixelOf(&model, e).point3D_id];
+    const ImageId id = model.track_elements[e].image_id;
+    const bool sees_both = images.count(alone) > 0 && images.count(wrong) > 0;
+    return sees_both ? id != alone && id != wrong : id == alone;
+  });
   Turn(&model, 7, 20, {1, 2, 0});
-  const ModelCheck check = CheckModel(model, {}, {});
+  const ModelCheck check = CheckModel(model);
   EXPECT_THAT(Images(check, ImageVerdict::kWrong), ElementsAre(wrong));
   EXPECT_EQ(check.images[6].num_tested, 0);
   EXPECT_EQ(check.images[6].verdict, ImageVerdict::kWeaklyHeld);
@@ -579,13 +537,10 @@ TEST(CheckModel, DoesNotCallAnImageWrongForHavingAWrongNeighbourAlone) {
 TEST(CheckModel, SaysNothingOfImagesWhereAllHaveFewObservations) {
   Model model = Scene(4, 10, 5);
   std::map<ImageId, int> num;
-  std::vector<char> is_removed;
-  for (const TrackElement& element : model.track_elements) {
-    is_removed.push_back(++num[element.image_id] > 12);
-  }
-  model = RemoveObservations(model, is_removed).model;
-  EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
-              IsEmpty());
+  model = Without(model, [&](uint64_t e) {
+    return ++num[model.track_elements[e].image_id] > 12;
+  });
+  EXPECT_THAT(Images(CheckModel(model), ImageVerdict::kWrong), IsEmpty());
 }
 
 // It has contradictions, but so few that three times the noise would have them,
@@ -593,7 +548,7 @@ TEST(CheckModel, SaysNothingOfImagesWhereAllHaveFewObservations) {
 TEST(CheckModel, NeedsLessEvidenceWhereTracksKeepLittleOfAnImage) {
   Model model = WithFewObservationsOf(7, 20, Scene(4, 10, 5));
   Turn(&model, 7, 0.2, {1, 2, 0});
-  EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
+  EXPECT_THAT(Images(CheckModel(model), ImageVerdict::kWrong),
               ElementsAre(model.images[7].id));
 }
 
@@ -603,7 +558,7 @@ TEST(CheckModel, HasNoVerdictWithoutPositions) {
     frame.rig_from_world.translation.setConstant(
         std::numeric_limits<double>::quiet_NaN());
   }
-  const ModelCheck check = CheckModel(model, {}, {});
+  const ModelCheck check = CheckModel(model);
   EXPECT_FALSE(check.sigma_px);
   EXPECT_FALSE(check.IsAnythingWrong());
 }
@@ -611,11 +566,8 @@ TEST(CheckModel, HasNoVerdictWithoutPositions) {
 TEST(CheckModel, HasTheSameBitsAtAnyNumberOfThreads) {
   Model model = Scene(5);
   Turn(&model, 2, 2, {1, 2, 3});
-  Context one, four;
-  one.num_threads = 1;
-  four.num_threads = 4;
-  const ModelCheck a = CheckModel(model, {}, one);
-  const ModelCheck b = CheckModel(model, {}, four);
+  const ModelCheck a = CheckModel(model, {}, {1});
+  const ModelCheck b = CheckModel(model, {}, {4});
   EXPECT_EQ(*a.sigma_px, *b.sigma_px);
   EXPECT_EQ(a.points, b.points);
   for (size_t n = 0; n < a.images.size(); ++n) {
@@ -628,7 +580,7 @@ TEST(CureModel, LeavesOutWhatIsWrongAndFitsBetter) {
   for (const bool is_legacy : {false, true}) {
     Model model = Scene(6);
     Turn(&model, 2, 3, {1, 2, 3});
-    Pixel(&model, model.points3D[7].track_begin).x += 50;
+    PixelOf(&model, model.points3D[7].track_begin).x += 50;
     if (is_legacy) {
       model.stores_rigs = false;
       for (size_t n = 0; n < model.images.size(); ++n) {
@@ -636,7 +588,7 @@ TEST(CureModel, LeavesOutWhatIsWrongAndFitsBetter) {
             ToPose(ImageGeometries(model)[n].cam_from_world);
       }
     }
-    const ModelCheck check = CheckModel(model, {}, {});
+    const ModelCheck check = CheckModel(model);
     const Model cured = CureModel(model, check, {}, {}).model;
     ValidateModel(cured);
     EXPECT_EQ(cured.images.size() + 1, model.images.size());
@@ -645,13 +597,13 @@ TEST(CureModel, LeavesOutWhatIsWrongAndFitsBetter) {
       EXPECT_NE(image.id, model.images[2].id);
     }
     EXPECT_LT(Summarize(PixelErrors(cured)).max, 7);
-    EXPECT_FALSE(CheckModel(cured, {}, {}).IsAnythingWrong());
+    EXPECT_FALSE(CheckModel(cured).IsAnythingWrong());
   }
 }
 
 TEST(CureModel, CopiesAModelThatNothingIsWrongWith) {
   const Model model = Scene(1);
-  const ModelCheck check = CheckModel(model, {}, {});
+  const ModelCheck check = CheckModel(model);
   ASSERT_FALSE(check.IsAnythingWrong());
   const Model cured = CureModel(model, check, {}, {}).model;
   ASSERT_EQ(cured.points3D.size(), model.points3D.size());
@@ -722,7 +674,7 @@ TEST(CheckModel, TakesTheNoiseOfLargeKeypointsToBeLarger) {
   }
   ModelCheckOptions options;
   options.database = &database;
-  EXPECT_GT(CheckModel(model, {}, {}).observations.size(), 30u);
+  EXPECT_GT(CheckModel(model).observations.size(), 30u);
   const ModelCheck check = CheckModel(model, options, {});
   EXPECT_LE(check.observations.size(), 2u);
   EXPECT_EQ(check.median_scale_px, 2);
@@ -733,9 +685,7 @@ TEST(CheckModel, OfPosesWithoutTracksAsksTheMatchesAlone) {
   Model model = Scene(7);
   const Database database = DatabaseOf(model);
   Turn(&model, 5, 3, {1, 2, 0});
-  model = RemoveObservations(model,
-                             std::vector<char>(model.track_elements.size(), 1))
-              .model;
+  model = Without(model, [](uint64_t) { return true; });
   ModelCheckOptions options;
   options.database = &database;
   const ModelCheck check = CheckModel(model, options, {});

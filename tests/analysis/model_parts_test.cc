@@ -27,9 +27,8 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 Model TwentyFrames(int seed, int sensors_per_rig = 1) {
-  SceneOptions options = SceneOf(20, 800, 5, 1);
+  SceneOptions options = SceneOf(20, 800, 5, 1, seed);
   options.sensors_per_rig = sensors_per_rig;
-  options.random_seed = static_cast<uint64_t>(seed);
   return SynthesizeScene(options).ground_truth;
 }
 

@@ -12,6 +12,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/dense_algebra.h"
+#include "tests/testing/edit_model.h"
 #include "tests/testing/scene_of.h"
 
 namespace krot::internal {
@@ -20,21 +21,11 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-SceneOptions SmallScene(int seed) {
-  SceneOptions options = SceneOf(10, 150, 4, 1);
-  options.random_seed = static_cast<uint64_t>(seed);
-  return options;
-}
+SceneOptions SmallScene(int seed) { return SceneOf(10, 150, 4, 1, seed); }
 
 // The observations as they are, at the true cameras and points.
 Model Scene(const SceneOptions& options) {
   return SynthesizeScene(options).ground_truth;
-}
-
-Point2D& PixelOf(Model* model, uint64_t e) {
-  const TrackElement& element = model->track_elements[e];
-  const int32_t image = ImageIndices(*model).at(element.image_id);
-  return model->images[image].points2D[element.point2D_idx];
 }
 
 void Move(Model* model, uint64_t e, double x, double y) {
@@ -506,11 +497,8 @@ TEST(SnoopNoise, HasTheSameBitsAtAnyNumberOfThreads) {
   options.num_points = 2000;
   options.outlier_ratio = 0.05;
   const Model model = Scene(options);
-  Context one, four;
-  one.num_threads = 1;
-  four.num_threads = 4;
-  const NoiseSnooping a = SnoopNoise(model, {}, one);
-  const NoiseSnooping b = SnoopNoise(model, {}, four);
+  const NoiseSnooping a = SnoopNoise(model, {}, {1});
+  const NoiseSnooping b = SnoopNoise(model, {}, {4});
   ASSERT_GT(a.removed.size(), 100u);
   ASSERT_EQ(a.removed.size(), b.removed.size());
   for (size_t n = 0; n < a.removed.size(); ++n) {

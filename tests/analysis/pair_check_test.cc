@@ -114,9 +114,7 @@ TEST(ExplainContradictions, ThatEndsEarlyIsAnExplanationAndSaysSo) {
 
 // Exact poses, noise of half a pixel, cameras with a lens.
 Model Scene() {
-  SceneOptions options = SceneOf(12, 1500, 6, 0.5);
-  options.random_seed = 3;
-  return SynthesizeScene(options).ground_truth;
+  return SynthesizeScene(SceneOf(12, 1500, 6, 0.5, 3)).ground_truth;
 }
 
 // Turns an image about its centre by an angle in degrees, and moves it.
@@ -341,11 +339,8 @@ TEST(CheckPairs, SaysTheSameAtAnyNumberOfThreads) {
   Model model = Scene();
   const Database database = DatabaseOf(model);
   Change(4, 1, 0.02, &model);
-  Context one, three;
-  one.num_threads = 1;
-  three.num_threads = 3;
-  const PairCheck a = CheckPairs(model, database, one);
-  const PairCheck b = CheckPairs(model, database, three);
+  const PairCheck a = CheckPairs(model, database, {1});
+  const PairCheck b = CheckPairs(model, database, {3});
   EXPECT_EQ(a.tolerance_px, b.tolerance_px);
   for (size_t p = 0; p < a.pairs.size(); ++p) {
     EXPECT_EQ(a.pairs[p].state, b.pairs[p].state);

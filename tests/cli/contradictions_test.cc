@@ -5,7 +5,6 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "krot/model.h"
 #include "krot/model/model_checks.h"
@@ -20,9 +19,6 @@ namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
-using ::testing::Not;
-using Json = nlohmann::json;
 
 class OnContradiction : public ::testing::Test {
  protected:
@@ -51,13 +47,13 @@ class OnContradiction : public ::testing::Test {
     throw std::logic_error("no such image");
   }
 
-  std::vector<std::string> Solve(const std::string& name) const {
+  Words Solve(const std::string& name) const {
     return {"solver",        "--input_path",       input_,
             "--output_path", folder_ / name,       "--report_path",
             report_,         "--certificate_path", folder_ / (name + ".json")};
   }
 
-  Json Report() const { return Json::parse(ReadBytes(report_)); }
+  Json Report() const { return ReadJson(report_); }
 
   int num_images() const { return static_cast<int>(model_.images.size()); }
 
@@ -67,22 +63,18 @@ class OnContradiction : public ::testing::Test {
   Model model_;
 };
 
-std::vector<std::string> With(std::vector<std::string> arguments,
-                              const std::string& on_contradiction) {
-  arguments.push_back("--Model.on_contradiction");
-  arguments.push_back(on_contradiction);
-  return arguments;
+Words With(const Words& arguments, const std::string& on_contradiction) {
+  return arguments + Words{"--Model.on_contradiction", on_contradiction};
 }
 
-std::vector<std::string> Check(const fs::path& model,
-                               const fs::path& certificate) {
+Words Check(const fs::path& model, const fs::path& certificate) {
   return {"certificate_checker", "--input_path", model, "--certificate_path",
           certificate};
 }
 
 TEST_F(OnContradiction, TheTracksAreFollowedAndBothFilesKeptWhereAsked) {
-  const KrotResult result = RunKrot(With(Solve("output"), "follow_tracks"));
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result =
+      Succeeded(RunKrot(With(Solve("output"), "follow_tracks")));
   EXPECT_THAT(result.err, HasSubstr("contradicts itself: 2 track elements"));
   EXPECT_THAT(result.err, HasSubstr("the tracks are followed"));
   Ignoring ignoring;
@@ -94,17 +86,14 @@ TEST_F(OnContradiction, TheTracksAreFollowedAndBothFilesKeptWhereAsked) {
   EXPECT_EQ(Report()["num_observations"], model_.track_elements.size());
   EXPECT_EQ(contradictions["followed"], "tracks");
   for (const fs::path& model : {input_, folder_ / "output"}) {
-    EXPECT_EQ(
-        RunKrot(With(Check(model, folder_ / "output.json"), "follow_tracks"))
-            .exit_code,
-        0);
+    Succeeded(
+        RunKrot(With(Check(model, folder_ / "output.json"), "follow_tracks")));
   }
 }
 
 // Of the three contradictions the tracks are right about all.
 TEST_F(OnContradiction, TheSideThatFitsIsFollowedByDefaultAndBothAgree) {
-  const KrotResult result = RunKrot(Solve("output"));
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(RunKrot(Solve("output")));
   EXPECT_THAT(result.err, HasSubstr("the tracks are followed"));
   Model agreed = SmallLegacyModel();
   for (Image& image : agreed.images) {
@@ -114,7 +103,7 @@ TEST_F(OnContradiction, TheSideThatFitsIsFollowedByDefaultAndBothAgree) {
   ignoring.translations = ignoring.coordinates = ignoring.point_errors = true;
   EXPECT_THAT(Load(folder_ / "output"), IsModel(agreed, ignoring));
   for (const fs::path& model : {input_, folder_ / "output"}) {
-    EXPECT_EQ(RunKrot(Check(model, folder_ / "output.json")).exit_code, 0);
+    Succeeded(RunKrot(Check(model, folder_ / "output.json")));
   }
 }
 
@@ -132,8 +121,7 @@ TEST_F(OnContradiction, TracksThatNameWrong2DPointsAreNotFollowed) {
   const Model right = SmallLegacyModel();
   const Model wrong = WithTracksOfFirst2DPoints(right);
   Save(wrong, input_);
-  const KrotResult result = RunKrot(Solve("output"));
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(RunKrot(Solve("output")));
   EXPECT_THAT(result.err, HasSubstr("the images are followed"));
   const Json contradictions = Report()["contradictions"];
   EXPECT_EQ(contradictions["followed"], "images");
@@ -161,7 +149,7 @@ double InitialCostOfColmap(const fs::path& model, const TempFolder& folder) {
 TEST_F(OnContradiction, ColmapsAdjustmentBeginsWithTheErrorsThatWereReported) {
   if (!HasColmap()) GTEST_SKIP() << "COLMAP is not installed";
   Save(WithTracksOfFirst2DPoints(SmallLegacyModel()), input_);
-  ASSERT_EQ(RunKrot(Solve("output")).exit_code, 0);
+  Succeeded(RunKrot(Solve("output")));
   EXPECT_NEAR(2 * InitialCostOfColmap(folder_ / "output", folder_),
               Report()["pixel_error"]["after"]["rms"].get<double>(), 1e-3);
 }
@@ -209,8 +197,7 @@ TEST_F(OnContradiction, WhereTheImagesSideBecomesWorseTheModelIsGivenBack) {
   Ignoring point_errors;
   point_errors.point_errors = true;
   EXPECT_THAT(Load(folder_ / "output"), IsModel(model, point_errors));
-  const KrotResult by_default = RunKrot(Solve("default"));
-  EXPECT_EQ(by_default.exit_code, 0);
+  const KrotResult by_default = Succeeded(RunKrot(Solve("default")));
   EXPECT_THAT(by_default.err, Not(HasSubstr(words)));
   EXPECT_LT(LargestError(Load(folder_ / "default")),
             LargestError(SmallLegacyModel()));
@@ -232,35 +219,32 @@ TEST_F(OnContradiction, WhereNeitherSideFitsEveryCommandRefuses) {
     element.point2D_idx = (element.point2D_idx + 1) % 10;
   }
   Save(model, input_);
-  const std::vector<std::vector<std::string>> commands = {
+  const std::vector<Words> commands = {
       Solve("output"),
       {"bundle_adjuster", "--input_path", input_, "--output_path",
        folder_ / "output"},
       {"model_checker", "--input_path", input_},
       {"tolerance_analyzer", "--input_path", input_,
        "--ToleranceAnalyzer.max_error", "9"}};
-  for (const std::vector<std::string>& command : commands) {
-    const KrotResult result = RunKrot(command);
-    EXPECT_EQ(result.exit_code, 2) << command[0];
-    EXPECT_THAT(result.err,
-                IsOneSentence("krot " + command[0],
-                              "neither fits; --Model.on_contradiction"));
+  for (const Words& command : commands) {
+    EXPECT_THAT(RunKrot(command),
+                IsRefused(2, "krot " + command[0],
+                          "neither fits; --Model.on_contradiction"))
+        << command[0];
     EXPECT_FALSE(fs::exists(folder_ / "output"));
   }
-  EXPECT_EQ(RunKrot(With({"model_analyzer", "--path", input_}, "follow_images"))
-                .exit_code,
-            0);
+  Succeeded(
+      RunKrot(With({"model_analyzer", "--path", input_}, "follow_images")));
 }
 
 TEST_F(OnContradiction, TheImagesAreFollowedWhereAskedAndAgreeAfterwards) {
-  const KrotResult result = RunKrot(With(Solve("output"), "follow_images"));
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result =
+      Succeeded(RunKrot(With(Solve("output"), "follow_images")));
   EXPECT_THAT(result.err, HasSubstr("the images are followed"));
   EXPECT_FALSE(FindContradictions(Load(folder_ / "output")).Any());
   const fs::path certificate = folder_ / "output.json";
-  EXPECT_EQ(RunKrot(Check(folder_ / "output", certificate)).exit_code, 0);
-  EXPECT_EQ(
-      RunKrot(With(Check(input_, certificate), "follow_images")).exit_code, 0);
+  Succeeded(RunKrot(Check(folder_ / "output", certificate)));
+  Succeeded(RunKrot(With(Check(input_, certificate), "follow_images")));
   EXPECT_EQ(RunKrot(Check(input_, certificate)).exit_code, 4);
 }
 
@@ -269,7 +253,7 @@ TEST_F(OnContradiction, EveryCommandRefusesWhereAsked) {
              R"({"version": 2, "norm": "inf", "lower_bound": 1, "rows_bound": 1,
                  "defect": 0,
                  "model_sha256": "", "observations": []})");
-  const std::vector<std::vector<std::string>> commands = {
+  const std::vector<Words> commands = {
       Solve("output"),
       {"point_triangulator", "--input_path", input_, "--output_path",
        folder_ / "output"},
@@ -279,18 +263,18 @@ TEST_F(OnContradiction, EveryCommandRefusesWhereAsked) {
       {"model_comparer", "--input_path1", input_, "--input_path2", input_},
       Check(input_, folder_ / "certificate.json"),
   };
-  for (const std::vector<std::string>& command : commands) {
-    const KrotResult result = RunKrot(With(command, "refuse"));
-    EXPECT_EQ(result.exit_code, 2) << command[0];
-    EXPECT_THAT(result.err, IsOneSentence("krot " + command[0],
-                                          "in its track, but that 2D point "
-                                          "names"));
+  for (const Words& command : commands) {
+    EXPECT_THAT(RunKrot(With(command, "refuse")),
+                IsRefused(2, "krot " + command[0],
+                          "in its track, but that 2D point "
+                          "names"))
+        << command[0];
     EXPECT_FALSE(fs::exists(folder_ / "output"));
   }
 }
 
 TEST_F(OnContradiction, EveryOtherCommandReadsAndCounts) {
-  const std::vector<std::vector<std::string>> commands = {
+  const std::vector<Words> commands = {
       {"point_triangulator", "--input_path", input_, "--output_path",
        folder_ / "points"},
       {"bundle_adjuster", "--input_path", input_, "--output_path",
@@ -299,10 +283,9 @@ TEST_F(OnContradiction, EveryOtherCommandReadsAndCounts) {
       {"model_comparer", "--input_path1", input_, "--input_path2", input_,
        "--overlay_path", folder_ / "overlay"},
   };
-  for (std::vector<std::string> command : commands) {
-    command.insert(command.end(), {"--report_path", report_});
-    const KrotResult result = RunKrot(command);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+  for (const Words& command : commands) {
+    const KrotResult result =
+        Succeeded(RunKrot(command, {"--report_path", report_}));
     EXPECT_THAT(result.err, HasSubstr("contradicts itself")) << command[0];
     Json contradictions = Report()["contradictions"];
     if (command[0] == "model_comparer") {
@@ -323,11 +306,10 @@ TEST_F(OnContradiction, A2DPointInTwoTracksIsAnObservationOfBoth) {
   model.track_elements.push_back(model.track_elements.front());
   ++model.points3D.back().track_end;
   Save(model, folder_ / "twice");
-  const KrotResult result = RunKrot(
+  Succeeded(RunKrot(
       With({"model_comparer", "--input_path1", folder_ / "twice",
             "--input_path2", folder_ / "twice", "--report_path", report_},
-           "follow_tracks"));
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+           "follow_tracks")));
   EXPECT_EQ(Report()["num_observations"]["shared"],
             model.track_elements.size());
   EXPECT_EQ(Report()["num_points"]["shared"], model.points3D.size());

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
-#include <nlohmann/json.hpp>
 
 #include "krot/database.h"
 #include "krot/model.h"
@@ -17,10 +16,7 @@
 namespace krot::internal {
 namespace {
 
-using ::testing::HasSubstr;
-using ::testing::Not;
 using ::testing::StartsWith;
-using Json = nlohmann::json;
 
 class DatabaseOption : public ::testing::Test {
  protected:
@@ -40,14 +36,11 @@ class DatabaseOption : public ::testing::Test {
     Save(model, folder_ / "moved");
   }
 
-  KrotResult Check(const std::string& model,
-                   const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {
-        "model_checker",   "--input_path",          folder_ / model,
-        "--database_path", folder_ / "database.db", "--report_path",
-        folder_ / "r.json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+  KrotResult Check(const std::string& model, const Words& more = {}) const {
+    return RunKrot(
+        {"model_checker", "--input_path", folder_ / model, "--database_path",
+         folder_ / "database.db", "--report_path", folder_ / "r.json"},
+        more);
   }
 
   TempFolder folder_;
@@ -55,8 +48,7 @@ class DatabaseOption : public ::testing::Test {
 
 TEST_F(DatabaseOption, HoldsMatchesAgainstPoses) {
   const std::string bytes = ReadBytes(folder_ / "database.db");
-  KrotResult result = Check("sound", {"--fail_on", "wrong"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+  KrotResult result = Succeeded(Check("sound", {"--fail_on", "wrong"}));
   EXPECT_THAT(result.out, StartsWith("Nothing is wrong: all "));
   EXPECT_THAT(result.out, HasSubstr("By the matches none of "));
   EXPECT_EQ(ReadBytes(folder_ / "database.db"), bytes);
@@ -68,7 +60,7 @@ TEST_F(DatabaseOption, HoldsMatchesAgainstPoses) {
                  "image.\n"));
   EXPECT_THAT(result.out, HasSubstr("1 image is wrong."));
   EXPECT_THAT(result.out, HasSubstr("rotation: turned by 1.7"));
-  const Json json = Json::parse(ReadBytes(folder_ / "r.json"))["database"];
+  const Json json = ReadJson(folder_ / "r.json")["database"];
   EXPECT_EQ(json["cheapest"]["images"].size(), 1);
   EXPECT_TRUE(json["images"][2]["is_wrong"]);
   EXPECT_EQ(json["images"][2]["fault"], "rotation");
@@ -78,27 +70,25 @@ TEST_F(DatabaseOption, HoldsMatchesAgainstPoses) {
 
 TEST_F(DatabaseOption, DeregistersATurnedImageAndNamesTheCommandThatPlacesIt) {
   const KrotResult result =
-      Check("turned", {"--output_path", folder_ / "cured"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+      Succeeded(Check("turned", {"--output_path", folder_ / "cured"}));
   EXPECT_THAT(result.out,
               HasSubstr("colmap image_registrator --database_path " +
                         (folder_ / "database.db").string() + " --input_path " +
                         (folder_ / "cured").string()));
   EXPECT_EQ(Load(folder_ / "cured").images.size(), 7u);
-  EXPECT_EQ(Check("cured", {"--fail_on", "wrong"}).exit_code, 0);
+  Succeeded(Check("cured", {"--fail_on", "wrong"}));
 }
 
 TEST_F(DatabaseOption, MovesAnImageWhosePositionAloneIsWrong) {
   const KrotResult result =
-      Check("moved", {"--output_path", folder_ / "cured"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+      Succeeded(Check("moved", {"--output_path", folder_ / "cured"}));
   EXPECT_THAT(result.out, HasSubstr("position: moved by 0.14"));
   EXPECT_THAT(result.out, HasSubstr("1 wrong image has a new position"));
   EXPECT_THAT(result.out, Not(HasSubstr("image_registrator")));
-  const Json json = Json::parse(ReadBytes(folder_ / "r.json"));
+  const Json json = ReadJson(folder_ / "r.json");
   EXPECT_EQ(json["moved_images"].size(), 1);
   EXPECT_EQ(Load(folder_ / "cured").images.size(), 8u);
-  EXPECT_EQ(Check("cured", {"--fail_on", "wrong"}).exit_code, 0);
+  Succeeded(Check("cured", {"--fail_on", "wrong"}));
 }
 
 TEST_F(DatabaseOption, HoldsMatchesAgainstPosesThatHaveNoPoints) {
@@ -113,32 +103,28 @@ TEST_F(DatabaseOption, MakesPointsForKnownPoses) {
   Model poses = WithShortTracks(Load(folder_ / "sound"), 0);
   for (Image& image : poses.images) image.points2D.clear();
   Save(poses, folder_ / "poses");
-  const auto triangulate = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> arguments = {
-        "point_triangulator", "--database_path", folder_ / "database.db",
-        "--image_path",       folder_.path(),    "--input_path",
-        folder_ / "poses",    "--output_path",   folder_ / "points",
-        "--report_path",      folder_ / "r.json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+  const auto triangulate = [&](const Words& more) {
+    return RunKrot({"point_triangulator", "--database_path",
+                    folder_ / "database.db", "--image_path", folder_.path(),
+                    "--input_path", folder_ / "poses", "--output_path",
+                    folder_ / "points", "--report_path", folder_ / "r.json"},
+                   more);
   };
-  KrotResult result = triangulate({"--clear_points", "1"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  KrotResult result = Succeeded(triangulate({"--clear_points", "1"}));
   const Model made = Load(folder_ / "points");
   ValidateModel(made);
   const Model truth = Load(folder_ / "sound");
   EXPECT_GT(100 * made.track_elements.size(), 95 * truth.track_elements.size());
   EXPECT_THAT(made.frames.size(), truth.frames.size());
-  const Json json = Json::parse(ReadBytes(folder_ / "r.json"));
+  const Json json = ReadJson(folder_ / "r.json");
   EXPECT_EQ(json["num_points"], made.points3D.size());
   EXPECT_THAT(result.out, StartsWith(json["verdict"].get<std::string>()));
   EXPECT_THAT(result.err, HasSubstr("no colours from 8 photos in "));
   EXPECT_EQ(triangulate({}).exit_code, 5);  // there is a model
   result = triangulate(
       {"--overwrite", "1", "--Mapper.filter_max_reproj_error", "1e-9"});
-  EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.err, IsOneSentence("krot point_triangulator",
-                                        "nothing to triangulate: no matches"));
+  EXPECT_THAT(result, IsRefused(3, "krot point_triangulator",
+                                "nothing to triangulate: no matches"));
   EXPECT_THAT(Load(folder_ / "points").points3D.size(), made.points3D.size());
 }
 
@@ -149,44 +135,37 @@ TEST_F(DatabaseOption, GivesPositionsAndPointsToRotationsAlone) {
     frame.rig_from_world.translation.setZero();
   }
   Save(rotations, folder_ / "rotations");
-  const auto solve = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> arguments = {
-        "solver",       "--database_path",     folder_ / "database.db",
-        "--input_path", folder_ / "rotations", "--output_path",
-        folder_ / "s",  "--report_path",       folder_ / "r.json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+  const auto solve = [&](const Words& more) {
+    return RunKrot({"solver", "--database_path", folder_ / "database.db",
+                    "--input_path", folder_ / "rotations", "--output_path",
+                    folder_ / "s", "--report_path", folder_ / "r.json"},
+                   more);
   };
   KrotResult result = solve({});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err,
-              IsOneSentence("krot solver",
-                            "--database_path needs --Solver.init feasible"));
-  result = solve({"--Solver.init", "feasible"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result,
+              IsRefused(1, "krot solver",
+                        "--database_path needs --Solver.init feasible"));
+  result = Succeeded(solve({"--Solver.init", "feasible"}));
   EXPECT_THAT(result.out, HasSubstr("The points come from the matches of "));
   ValidateModel(Load(folder_ / "s"));
-  const Json json = Json::parse(ReadBytes(folder_ / "r.json"));
+  const Json json = ReadJson(folder_ / "r.json");
   EXPECT_GT(json["matches"]["num_pairs"], 20);
   EXPECT_LT(json["pixel_error"]["after"]["max"], 4);
-  ASSERT_EQ(RunKrot({"model_comparer", "--input_path1", folder_ / "sound",
+  Succeeded(RunKrot({"model_comparer", "--input_path1", folder_ / "sound",
                      "--input_path2", folder_ / "s", "--alignment",
-                     "similarity", "--report_path", folder_ / "c.json"})
-                .exit_code,
-            0);
-  const Json compared = Json::parse(ReadBytes(folder_ / "c.json"));
+                     "similarity", "--report_path", folder_ / "c.json"}));
+  const Json compared = ReadJson(folder_ / "c.json");
   EXPECT_LT(compared["center"]["rms"].get<double>(),
             0.005 * compared["scene_radius"].get<double>());
   result = solve({"--Solver.init", "feasible", "--overwrite", "1",
                   "--Solver.max_error", "1e-9", "--log_level", "0"});
-  EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.err,
-              IsOneSentence("krot solver", "nothing to solve: no matches of"));
+  EXPECT_THAT(result,
+              IsRefused(3, "krot solver", "nothing to solve: no matches of"));
 }
 
 TEST_F(DatabaseOption, ProvesWhatNoBaselinesExplain) {
   const std::string certificate = folder_ / "baselines.json";
-  ASSERT_EQ(Check("turned", {"--certificate_path", certificate}).exit_code, 0);
+  Succeeded(Check("turned", {"--certificate_path", certificate}));
   const auto judge = [&](const Json& json, const std::string& model) {
     WriteBytes(folder_ / "judged.json", json.dump());
     return RunKrot({"certificate_checker", "--input_path", folder_ / model,
@@ -194,14 +173,13 @@ TEST_F(DatabaseOption, ProvesWhatNoBaselinesExplain) {
                     "--certificate_path", folder_ / "judged.json",
                     "--report_path", folder_ / "v.json"});
   };
-  const Json json = Json::parse(ReadBytes(certificate));
-  const Json database = Json::parse(ReadBytes(folder_ / "r.json"))["database"];
+  const Json json = ReadJson(certificate);
+  const Json database = ReadJson(folder_ / "r.json")["database"];
   ASSERT_EQ(json["baselines"].size(), database["num_contradictory_pairs"]);
   ASSERT_GT(json["baselines"].size(), 3);
-  KrotResult result = judge(json, "turned");
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+  KrotResult result = Succeeded(judge(json, "turned"));
   EXPECT_THAT(result.out, StartsWith("The certificate holds: with the "));
-  const Json verdict = Json::parse(ReadBytes(folder_ / "v.json"));
+  const Json verdict = ReadJson(folder_ / "v.json");
   EXPECT_EQ(verdict["baselines"]["pairs"].size(), json["baselines"].size());
   // Other rotations.
   EXPECT_EQ(judge(json, "sound").exit_code, 4);
@@ -237,35 +215,32 @@ TEST_F(DatabaseOption, ProvesWhatNoBaselinesExplain) {
   EXPECT_EQ(judge(wide, "turned").exit_code, 4);
   result = RunKrot({"certificate_checker", "--input_path", folder_ / "turned",
                     "--certificate_path", certificate});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, IsOneSentence("krot certificate_checker",
-                                        "--database_path is required"));
+  EXPECT_THAT(result, IsRefused(1, "krot certificate_checker",
+                                "--database_path is required"));
 }
 
 TEST_F(DatabaseOption, OfASyntheticSceneGivesColmapAndKrotTheSamePoints) {
   if (!HasColmap()) GTEST_SKIP() << "no colmap";
   const std::string database = folder_ / "scene.db";
-  ASSERT_EQ(
-      RunKrot({"model_synthesizer", "--output_path", folder_ / "start",
-               "--ground_truth_path", folder_ / "truth", "--database_path",
-               database, "--Scene.has_rigs", "0", "--Scene.pixel_noise", "0.5"})
-          .exit_code,
-      0);
+  Succeeded(RunKrot({"model_synthesizer", "--output_path", folder_ / "start",
+                     "--ground_truth_path", folder_ / "truth",
+                     "--database_path", database, "--Scene.has_rigs", "0",
+                     "--Scene.pixel_noise", "0.5"}));
   const auto call = [&](const std::string& output) {
     std::filesystem::create_directory(folder_ / "photos");
-    return std::vector<std::string>{"point_triangulator",
-                                    "--database_path",
-                                    database,
-                                    "--image_path",
-                                    folder_ / "photos",
-                                    "--input_path",
-                                    folder_ / "truth",
-                                    "--output_path",
-                                    folder_ / output,
-                                    "--clear_points",
-                                    "1"};
+    return Words{"point_triangulator",
+                 "--database_path",
+                 database,
+                 "--image_path",
+                 folder_ / "photos",
+                 "--input_path",
+                 folder_ / "truth",
+                 "--output_path",
+                 folder_ / output,
+                 "--clear_points",
+                 "1"};
   };
-  ASSERT_EQ(RunKrot(call("krot")).exit_code, 0);
+  Succeeded(RunKrot(call("krot")));
   std::filesystem::create_directory(folder_ / "colmap");
   ASSERT_TRUE(RunColmap(call("colmap"), folder_ / "log"));
   const Model ours = Load(folder_ / "krot"), theirs = Load(folder_ / "colmap");
@@ -276,10 +251,8 @@ TEST_F(DatabaseOption, OfASyntheticSceneGivesColmapAndKrotTheSamePoints) {
 
 TEST_F(DatabaseOption, IsRefusedWithCode2IfItCannotBeRead) {
   WriteBytes(folder_ / "database.db", "no database");
-  const KrotResult result = Check("sound");
-  EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err,
-              IsOneSentence("krot model_checker", "is no SQLite database"));
+  EXPECT_THAT(Check("sound"),
+              IsRefused(2, "krot model_checker", "is no SQLite database"));
 }
 
 }  // namespace

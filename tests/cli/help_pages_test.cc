@@ -12,12 +12,9 @@
 namespace krot::internal {
 namespace {
 
-using ::testing::HasSubstr;
-
-std::vector<std::string> Matches(const std::string& text,
-                                 const std::string& pattern) {
+Words Matches(const std::string& text, const std::string& pattern) {
   const std::regex regex(pattern);
-  std::vector<std::string> matches;
+  Words matches;
   for (std::sregex_iterator it(text.begin(), text.end(), regex), end; it != end;
        ++it) {
     matches.push_back((*it)[1]);
@@ -48,12 +45,11 @@ std::string Completed(const std::string& words) {
 
 TEST(HelpPages, TheManualHoldsEveryOptionOfEveryCommand) {
   const std::string manual = RunKrot({"--help=man"}).out;
-  const std::vector<std::string> commands =
-      Matches(manual, R"(\.BR krot\\-(\S+))");
+  const Words commands = Matches(manual, R"(\.BR krot\\-(\S+))");
   EXPECT_GE(commands.size(), 8);
   for (const std::string& command : commands) {
     const std::string page = RunKrot({command, "--help=man"}).out;
-    const std::vector<std::string> options =
+    const Words options =
         Matches(RunKrot({command, "--help"}).out, R"(\n  --([^\s,]+)\n)");
     EXPECT_GE(options.size(), 3) << command;
     for (const std::string& option : options) {
@@ -76,9 +72,44 @@ TEST(HelpPages, AFileIsLeftToTheShell) {
 }
 
 TEST(HelpPages, AnUnknownFormatIsRefused) {
-  const KrotResult result = RunKrot({"solver", "--help=html"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, IsOneSentence("krot solver", "--help = html"));
+  EXPECT_THAT(RunKrot({"solver", "--help=html"}),
+              IsRefused(1, "krot solver", "--help = html"));
+}
+
+TEST(Krot, PrintsItsVersion) {
+  const KrotResult result = Succeeded(RunKrot({"--version"}));
+  EXPECT_EQ(result.out, "krot " KROT_VERSION "\n");
+}
+
+TEST(Krot, ListsCommandsAndExitCodesWhenAskedForHelp) {
+  const std::string help = RunKrot({"help"}).out;
+  for (const char* command : {"solver", "point_triangulator", "model_analyzer",
+                              "model_comparer", "model_synthesizer", "help",
+                              "certificate was refused", "130  interrupted"}) {
+    EXPECT_THAT(help, HasSubstr(command));
+  }
+  EXPECT_EQ(RunKrot({}).out, help);
+  EXPECT_EQ(RunKrot({"-h"}).out, help);
+  EXPECT_EQ(RunKrot({"--help"}).out, help);
+}
+
+TEST(Krot, ExplainsACommandInEitherManner) {
+  const KrotResult result = Succeeded(RunKrot({"solver", "-h"}));
+  EXPECT_EQ(result.err, "");
+  EXPECT_THAT(result.out, HasSubstr("--Solver.norm"));
+  EXPECT_EQ(RunKrot({"help", "solver"}).out, result.out);
+  EXPECT_EQ(RunKrot({"solver", "--input_path", "a", "--help"}).out, result.out);
+}
+
+TEST(Krot, NamesTheNearestCommandForAnUnknownOne) {
+  EXPECT_THAT(RunKrot({"slover"}),
+              IsRefused(1, "krot", "did you mean solver?"));
+  EXPECT_EQ(RunKrot({"help", "mapper"}).exit_code, 1);
+  EXPECT_EQ(RunKrot({""}).exit_code, 1);
+}
+
+TEST(Krot, KeepsAnErrorOnOneLineWhateverTheUserTyped) {
+  EXPECT_THAT(RunKrot({"two\nlines"}).err, IsOneSentence("krot", "two lines"));
 }
 
 }  // namespace

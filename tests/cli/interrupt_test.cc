@@ -24,30 +24,31 @@ class Interrupt : public ::testing::Test {
     before_ = Load(folder_ / "model");
   }
 
-  // In place, so that a mix of old and new would show.
-  std::vector<std::string> Arguments() const {
-    return {"solver",
+  // So that a mix of old and new would show.
+  Words InPlace(const std::string& command) const {
+    return {command,
             "--input_path",
             folder_ / "model",
             "--output_path",
             folder_ / "model",
             "--overwrite",
-            "1",
-            "--ResInt.sweep_tolerance",
-            "0",
-            "--report_path",
-            folder_ / "report.json",
-            "--ResInt.max_sweeps",
-            "1000000",
-            "--Solver.settings",
-            "paper"};
+            "1"};
+  }
+
+  Words Arguments() const {
+    return InPlace("solver") + Words{"--ResInt.sweep_tolerance",
+                                     "0",
+                                     "--report_path",
+                                     folder_ / "report.json",
+                                     "--ResInt.max_sweeps",
+                                     "1000000",
+                                     "--Solver.settings",
+                                     "paper"};
   }
 
   KrotResult SignalOnTheWayToAStart() const {
-    KrotProcess process({"solver", "--input_path", folder_ / "model",
-                         "--output_path", folder_ / "model", "--overwrite", "1",
-                         "--Solver.init", "feasible", "--Solver.method",
-                         "joint"});
+    KrotProcess process(InPlace("solver") + Words{"--Solver.init", "feasible",
+                                                  "--Solver.method", "joint"});
     process.WaitForErrorText("iteration 1: looking for a start below");
     process.Signal(SIGINT);
     return process.Wait();
@@ -61,7 +62,7 @@ class Interrupt : public ::testing::Test {
   }
 
   void ExpectNothingChanged() const {
-    EXPECT_EQ(FileNames(folder_.path()), std::vector<std::string>{"model"});
+    EXPECT_EQ(FileNames(folder_.path()), Words{"model"});
     EXPECT_THAT(Load(folder_ / "model"), IsModel(before_));
   }
 
@@ -84,9 +85,7 @@ TEST_F(Interrupt, ByTerminationDoesTheSame) {
 }
 
 TEST_F(Interrupt, WritesTheBestEstimateSoFarIfAsked) {
-  std::vector<std::string> arguments = Arguments();
-  arguments.insert(arguments.end(), {"--write_on_interrupt", "1"});
-  KrotProcess process(arguments);
+  KrotProcess process(Arguments() + Words{"--write_on_interrupt", "1"});
   process.WaitForErrorText("sweep 1:");
   process.Signal(SIGINT);
   const KrotResult result = process.Wait();
@@ -96,18 +95,16 @@ TEST_F(Interrupt, WritesTheBestEstimateSoFarIfAsked) {
                               " holds the best estimate so far\n"));
   const double before = Summarize(PixelErrors(before_)).max;
   EXPECT_LT(Summarize(PixelErrors(Load(folder_ / "model"))).max, before);
-  EXPECT_THAT(ReadBytes(folder_ / "report.json"),
-              ::testing::HasSubstr("\"interrupted\""));
+  EXPECT_THAT(ReadBytes(folder_ / "report.json"), HasSubstr("\"interrupted\""));
 }
 
 TEST_F(Interrupt, BeforeThereIsAnEstimateWritesNothingEvenIfAsked) {
   for (const auto& [method, words] :
        {std::pair("joint", "iteration 1: looking for a start below"),
         std::pair("auto", "programme: 1 of 2")}) {
-    KrotProcess process({"solver", "--input_path", folder_ / "model",
-                         "--output_path", folder_ / "model", "--overwrite", "1",
-                         "--Solver.init", "feasible", "--Solver.method", method,
-                         "--write_on_interrupt", "1"});
+    KrotProcess process(InPlace("solver") + Words{"--Solver.init", "feasible",
+                                                  "--Solver.method", method,
+                                                  "--write_on_interrupt", "1"});
     process.WaitForErrorText(words);
     process.Signal(SIGTERM);
     const KrotResult result = process.Wait();
@@ -122,7 +119,7 @@ TEST_F(Interrupt, BeforeThereIsAnEstimateWritesNothingEvenIfAsked) {
 TEST_F(Interrupt, OnTheWayToAStartDoesTheSame) {
   const KrotResult result = SignalOnTheWayToAStart();
   EXPECT_EQ(result.exit_code, 130);
-  EXPECT_THAT(result.err, ::testing::Not(::testing::HasSubstr("sweep 1:")));
+  EXPECT_THAT(result.err, Not(HasSubstr("sweep 1:")));
   ExpectNothingChanged();
 }
 
@@ -133,47 +130,39 @@ TEST_F(Interrupt, ByKillLeavesTheOldModel) {
 
 TEST_F(Interrupt, ByKillLeavesACheckpointToWriteOrToGoOnFrom) {
   const auto arguments = [this](const std::string& output) {
-    return std::vector<std::string>{"solver",          "--input_path",
-                                    folder_ / "model", "--output_path",
-                                    folder_ / output,  "--checkpoint_path",
-                                    folder_ / "steps"};
+    return Words{"solver",         "--input_path",   folder_ / "model",
+                 "--output_path",  folder_ / output, "--checkpoint_path",
+                 folder_ / "steps"};
   };
-  ASSERT_EQ(RunKrot(arguments("undisturbed")).exit_code, 0);
+  Succeeded(RunKrot(arguments("undisturbed")));
   KrotProcess process(arguments("out"));
   process.WaitForErrorText("iteration 1:");
   process.Signal(SIGKILL);
   EXPECT_EQ(process.Wait().exit_code, -SIGKILL);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 
-  std::vector<std::string> only = arguments("so_far");
-  only.insert(only.end(), {"--checkpoint_only", "1"});
-  const KrotResult so_far = RunKrot(only);
-  EXPECT_EQ(so_far.exit_code, 130);
+  EXPECT_EQ(RunKrot(arguments("so_far"), {"--checkpoint_only", "1"}).exit_code,
+            130);
   EXPECT_LT(Summarize(PixelErrors(Load(folder_ / "so_far"))).max,
             Summarize(PixelErrors(before_)).max);
 
-  const KrotResult again = RunKrot(arguments("out"));
-  EXPECT_EQ(again.exit_code, 0);
-  EXPECT_THAT(
-      again.err,
-      ::testing::HasSubstr("steps: going on behind 1 step of an earlier run"));
+  const KrotResult again = Succeeded(RunKrot(arguments("out")));
+  EXPECT_THAT(again.err,
+              HasSubstr("steps: going on behind 1 step of an earlier run"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "steps"));
   EXPECT_THAT(Load(folder_ / "out"), IsModel(Load(folder_ / "undisturbed")));
 }
 
 TEST_F(Interrupt, RefusesACheckpointOfOtherOptions) {
-  std::vector<std::string> arguments = {
+  const Words arguments = {
       "solver",        "--input_path",      folder_ / "model", "--output_path",
       folder_ / "out", "--checkpoint_path", folder_ / "steps"};
   KrotProcess process(arguments);
   process.WaitForErrorText("iteration 1:");
   process.Signal(SIGKILL);
   process.Wait();
-  arguments.insert(arguments.end(), {"--Solver.relative_gap", "1e-3"});
-  const KrotResult result = RunKrot(arguments);
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, IsOneSentence("krot solver",
-                                        "this checkpoint is of another run"));
+  EXPECT_THAT(RunKrot(arguments, {"--Solver.relative_gap", "1e-3"}),
+              IsRefused(1, "krot solver", "this checkpoint is of another run"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
@@ -184,12 +173,12 @@ class InterruptAdjustment : public Interrupt,
 
 TEST_P(InterruptAdjustment, EndsWith130AndWritesNothing) {
   const std::string ceres = "--BundleAdjustmentCeres.";
-  KrotProcess process({"bundle_adjuster", "--input_path", folder_ / "model",
-                       "--output_path", folder_ / "model", "--overwrite", "1",
-                       "--report_path", folder_ / "report.json", "--html_path",
-                       folder_ / "page.html", ceres + "max_num_iterations",
-                       "1000000", ceres + "function_tolerance", "0",
-                       ceres + "gradient_tolerance", "0", GetParam(), "1000"});
+  KrotProcess process(
+      InPlace("bundle_adjuster") +
+      Words{"--report_path", folder_ / "report.json", "--html_path",
+            folder_ / "page.html", ceres + "max_num_iterations", "1000000",
+            ceres + "function_tolerance", "0", ceres + "gradient_tolerance",
+            "0", GetParam(), "1000"});
   process.WaitForErrorText("iteration ");
   process.Signal(SIGINT);
   const KrotResult result = process.Wait();

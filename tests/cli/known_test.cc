@@ -8,7 +8,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
-#include <nlohmann/json.hpp>
 
 #include "krot/geometry.h"
 #include "tests/cli/known_fixture.h"
@@ -18,8 +17,6 @@
 
 namespace krot::internal {
 namespace {
-
-using ::testing::HasSubstr;
 
 // The rotations of all images, as a file has them.
 std::string RotationLines(const Model& model) {
@@ -55,12 +52,11 @@ TEST_F(Known, RotationsAloneGiveAWipedModelTheCertifiedOptimumOfTheWhole) {
     Save(whole, folder_ / "whole");
     Save(Wiped(whole), folder_ / "wiped");
     std::ofstream(folder_ / "rotations.txt") << RotationLines(whole);
-    ASSERT_EQ(Solve("whole", "out_whole", {"--overwrite", "1"}).exit_code, 0);
-    const KrotResult result =
+    Succeeded(Solve("whole", "out_whole", {"--overwrite", "1"}));
+    const KrotResult result = Succeeded(
         Solve("wiped", "out",
               {"--overwrite", "1", "--rotations_path",
-               folder_ / "rotations.txt", "--Solver.init", "feasible"});
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+               folder_ / "rotations.txt", "--Solver.init", "feasible"}));
     EXPECT_THAT(result.err, HasSubstr("0 images without one"));
     const Json expected = Report("out_whole");
     const Json found = Report("out");
@@ -74,9 +70,9 @@ TEST_F(Known, RotationsAloneGiveAWipedModelTheCertifiedOptimumOfTheWhole) {
     EXPECT_LE(found["relative_gap"], 1e-3);
     if (sensors_per_rig == 1) {
       // Of the same cameras and rotations, so that the proof is one of both.
-      EXPECT_EQ(Check("whole", "out").exit_code, 0);
+      Succeeded(Check("whole", "out"));
     }
-    EXPECT_EQ(Check("out", "out").exit_code, 0);
+    Succeeded(Check("out", "out"));
   }
 }
 
@@ -86,10 +82,9 @@ TEST_F(Known, RotationsOfSomeImagesLeaveTheOthersTheirsAndAreCounted) {
   std::string lines = RotationLines(model);
   lines.erase(lines.rfind('\n', lines.size() - 2) + 1);  // the last image's
   std::ofstream(folder_ / "rotations.txt") << lines;
-  ASSERT_EQ(Solve("input", "plain").exit_code, 0);
-  const KrotResult result =
-      Solve("input", "output", {"--rotations_path", folder_ / "rotations.txt"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(Solve("input", "plain"));
+  const KrotResult result = Succeeded(Solve(
+      "input", "output", {"--rotations_path", folder_ / "rotations.txt"}));
   EXPECT_THAT(result.err, HasSubstr("; 1 image without one"));
   EXPECT_EQ(Report("output")["rotations"]["num_kept_images"], 1);
   EXPECT_THAT(Load(folder_ / "output"), IsModel(Load(folder_ / "plain")));
@@ -102,24 +97,20 @@ TEST_F(Known, RotationsFromElsewhereLeaveTheBoundToTheNoise) {
   Save(truth, folder_ / "input");
   std::ofstream(folder_ / "rotations.txt") << RotationLines(truth);
   // No error counts as gross, so that the model's own positions fit.
-  std::vector<std::string> arguments = {"solver",
-                                        "--Solver.init",
-                                        "feasible",
-                                        "--input_path",
-                                        folder_ / "input",
-                                        "--output_path",
-                                        folder_ / "output",
-                                        "--report_path",
-                                        folder_ / "output.json",
-                                        "--overwrite",
-                                        "1",
-                                        "--Problem.init_max_error",
-                                        "1e6"};
-  EXPECT_EQ(RunKrot(arguments).exit_code, 0);
+  const Words arguments =
+      Words{"solver",
+            "--input_path",
+            folder_ / "input",
+            "--output_path",
+            folder_ / "output",
+            "--report_path",
+            folder_ / "output.json"} +
+      Words{"--Solver.init", "feasible",    "--Problem.init_max_error",
+            "1e6",           "--overwrite", "1"};
+  Succeeded(RunKrot(arguments));
   EXPECT_TRUE(Report("output")["outliers"].is_null());
-  arguments.insert(arguments.end(),
-                   {"--rotations_path", folder_ / "rotations.txt"});
-  EXPECT_EQ(RunKrot(arguments).exit_code, 0);
+  Succeeded(
+      RunKrot(arguments, {"--rotations_path", folder_ / "rotations.txt"}));
   EXPECT_GT(Report("output")["outliers"]["num_removed"], 0);
 }
 
@@ -143,23 +134,18 @@ TEST_F(Known, RotationsInAnotherConventionAreRefusedBeforeTheWork) {
     Save(model, folder_ / std::to_string(sensors_per_rig));
     std::ofstream(folder_ / "rotations.txt")
         << ChangedRotationLines(model, &Inverted);
-    for (const std::vector<std::string>& command :
-         {std::vector<std::string>{"solver", "--output_path",
-                                   folder_ / "output"},
+    for (const Words& command :
+         {Words{"solver", "--output_path", folder_ / "output"},
           {"outlier_filter", "--output_path", folder_ / "output",
            "--OutlierFilter.max_error", "3"},
           {"tolerance_analyzer", "--ToleranceAnalyzer.max_error", "3"}}) {
-      std::vector<std::string> arguments = command;
-      arguments.insert(
-          arguments.end(),
-          {"--input_path", folder_ / std::to_string(sensors_per_rig),
-           "--rotations_path", folder_ / "rotations.txt"});
-      const KrotResult result = RunKrot(arguments);
-      EXPECT_EQ(result.exit_code, 2);
-      EXPECT_THAT(result.err,
-                  IsOneSentence("krot " + command[0],
-                                "are written a -b -c -d: they are world from "
-                                "camera, the inverse"));
+      EXPECT_THAT(
+          RunKrot(command,
+                  {"--input_path", folder_ / std::to_string(sensors_per_rig),
+                   "--rotations_path", folder_ / "rotations.txt"}),
+          IsRefused(2, "krot " + command[0],
+                    "are written a -b -c -d: they are world from "
+                    "camera, the inverse"));
     }
     EXPECT_FALSE(std::filesystem::exists(folder_ / "output"));
   }
@@ -189,10 +175,9 @@ TEST_F(Known, RotationsInAnotherWorldFrameGiveTheSameModel) {
       Eigen::Quaterniond(0.3, -0.5, 0.7, 0.2).normalized();
   std::ofstream(folder_ / "rotations.txt") << ChangedRotationLines(
       model, [&](const Eigen::Quaterniond& q) { return ToWxyz(q * turn); });
-  ASSERT_EQ(Solve("input", "plain").exit_code, 0);
-  const KrotResult result =
-      Solve("input", "output", {"--rotations_path", folder_ / "rotations.txt"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(Solve("input", "plain"));
+  const KrotResult result = Succeeded(Solve(
+      "input", "output", {"--rotations_path", folder_ / "rotations.txt"}));
   EXPECT_THAT(result.err, HasSubstr("the list is in another world frame"));
   EXPECT_NEAR(Report("output")["rotations"]["frame_turn_deg"],
               Eigen::AngleAxisd(turn).angle() * 180 / M_PI, 1e-6);
@@ -223,7 +208,7 @@ TEST_F(Known, RotationsThatAreInexactTellByHowMuchTheyTurn) {
       Solve("input", "output", {"--rotations_path", folder_ / "rotations.txt"});
   EXPECT_THAT(result.err, HasSubstr("turned by 0.57 degrees in the median and "
                                     "0.57 at most"));
-  EXPECT_THAT(result.err, ::testing::Not(HasSubstr("warning")));
+  EXPECT_THAT(result.err, Not(HasSubstr("warning")));
 }
 
 TEST_F(Known, PosesWithTheirHalvesExchangedAreWarnedOf) {
@@ -235,8 +220,7 @@ TEST_F(Known, PosesWithTheirHalvesExchangedAreWarnedOf) {
   }
   Save(model, folder_ / "input");
   const KrotResult result =
-      RunKrot({"model_analyzer", "--path", folder_ / "input"});
-  EXPECT_EQ(result.exit_code, 0);
+      Succeeded(RunKrot({"model_analyzer", "--path", folder_ / "input"}));
   const std::string count = std::to_string(model.images.size());
   EXPECT_THAT(result.err, HasSubstr("the quaternions of " + count + " of " +
                                     count + " images are far from unit"));
@@ -246,13 +230,12 @@ TEST_F(Known, PosesWithTheirHalvesExchangedAreWarnedOf) {
 TEST_F(Known, RotationsThatCannotBeReadEndInOneSentence) {
   Save(SmallLegacyModel(), folder_ / "input");
   std::ofstream(folder_ / "rotations.txt") << "nobody.jpg 1 0 0 0\n";
-  const KrotResult result =
-      Solve("input", "output", {"--rotations_path", folder_ / "rotations.txt"});
-  EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err, IsOneSentence("krot solver",
-                                        "rotations.txt: found no image of the "
-                                        "model in its 1 line, the first has "
-                                        "image \"nobody.jpg\""));
+  EXPECT_THAT(
+      Solve("input", "output", {"--rotations_path", folder_ / "rotations.txt"}),
+      IsRefused(2, "krot solver",
+                "rotations.txt: found no image of the "
+                "model in its 1 line, the first has "
+                "image \"nobody.jpg\""));
   EXPECT_EQ(Solve("input", "output", {"--rotations_path", folder_ / "none"})
                 .exit_code,
             2);
@@ -264,11 +247,10 @@ TEST_F(Known, RotationsMayBeFiltered) {
   const Model whole = SynthesizeScene(options).model;
   Save(Wiped(whole), folder_ / "wiped");
   std::ofstream(folder_ / "rotations.txt") << RotationLines(whole);
-  const KrotResult result = RunKrot(
+  Succeeded(RunKrot(
       {"outlier_filter", "--input_path", folder_ / "wiped", "--output_path",
        folder_ / "output", "--OutlierFilter.max_error", "3", "--rotations_path",
-       folder_ / "rotations.txt", "--report_path", folder_ / "output.json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+       folder_ / "rotations.txt", "--report_path", folder_ / "output.json"}));
   EXPECT_TRUE(Report("output")["is_within"]);
   EXPECT_EQ(Report("output")["rotations"]["num_kept_images"], 0);
 }
@@ -298,7 +280,7 @@ TEST_F(Known, CoordinatesFarAwayShiftTheResultAndNothingElse) {
   Save(FarAway(model, shift), folder_ / "far");
   std::ofstream(folder_ / "images.txt") << near.images[1].name << "\n"
                                         << near.images[4].name << "\n";
-  const std::vector<std::vector<std::string>> commands = {
+  const std::vector<Words> commands = {
       {"solver"},
       {"solver", "--Solver.method", "res_int"},
       {"solver", "--Solver.init", "feasible"},
@@ -307,28 +289,23 @@ TEST_F(Known, CoordinatesFarAwayShiftTheResultAndNothingElse) {
       {"point_triangulator"},
       {"outlier_filter", "--OutlierFilter.max_error", "1.2"},
       {"bundle_adjuster", "--BundleAdjustment.max_error", "2"}};
-  for (std::vector<std::string> command : commands) {
+  for (const Words& command : commands) {
     SCOPED_TRACE(::testing::PrintToString(command));
     const bool has_certificate = command[0] == "solver" && command.size() < 3;
     for (const std::string side : {"near", "far"}) {
-      std::vector<std::string> arguments = command;
-      arguments.insert(arguments.end(),
-                       {"--input_path", folder_ / side, "--output_path",
-                        folder_ / (side + "_out"), "--overwrite", "1"});
-      if (has_certificate) {
-        arguments.insert(
-            arguments.end(),
-            {"--certificate_path", folder_ / (side + "_out_proof.json")});
-      }
-      const KrotResult result = RunKrot(arguments);
-      ASSERT_EQ(result.exit_code, 0) << result.err;
+      const Words paths = {"--input_path",  folder_ / side,
+                           "--output_path", folder_ / (side + "_out"),
+                           "--overwrite",   "1"};
+      const Words proof = {"--certificate_path",
+                           folder_ / (side + "_out_proof.json")};
+      Succeeded(RunKrot(command + paths, has_certificate ? proof : Words{}));
     }
     EXPECT_LT(LargestDistance(Load(folder_ / "near_out"),
                               Load(folder_ / "far_out"), shift),
               1e-6);
     if (has_certificate) {
-      EXPECT_EQ(Check("far_out", "far_out").exit_code, 0);
-      EXPECT_EQ(Check("far_out", "near_out").exit_code, 0);
+      Succeeded(Check("far_out", "far_out"));
+      Succeeded(Check("far_out", "near_out"));
     }
   }
 }

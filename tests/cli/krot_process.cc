@@ -21,10 +21,8 @@ void Redirect(int descriptor, const std::filesystem::path& file) {
 
 }  // namespace
 
-KrotProcess::KrotProcess(const std::vector<std::string>& arguments,
-                         uint64_t max_memory_bytes) {
-  std::vector<std::string> words = {KROT_EXECUTABLE};
-  words.insert(words.end(), arguments.begin(), arguments.end());
+KrotProcess::KrotProcess(const Words& arguments, uint64_t max_memory_bytes) {
+  Words words = Words{KROT_EXECUTABLE} + arguments;
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -70,9 +68,13 @@ KrotResult KrotProcess::Wait() {
           ReadBytes(folder_ / "out"), ReadBytes(folder_ / "err")};
 }
 
-KrotResult RunKrot(const std::vector<std::string>& arguments,
-                   uint64_t max_memory_bytes) {
-  return KrotProcess(arguments, max_memory_bytes).Wait();
+KrotResult RunKrot(const Words& arguments, const Words& more) {
+  return KrotProcess(arguments + more).Wait();
+}
+
+KrotResult Succeeded(KrotResult result) {
+  if (result.exit_code != 0) throw std::runtime_error(result.err);
+  return result;
 }
 
 }  // namespace krot::internal

@@ -19,8 +19,6 @@ namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 // A model whose unit is 40 m, in UTM coordinates, and what else is known of it.
 class Metres : public Known {
@@ -48,11 +46,11 @@ class Metres : public Known {
     }
   }
   KrotResult SolveIn(const std::string& frame, const std::string& output,
-                     std::vector<std::string> more = {}) const {
-    more.insert(more.end(),
-                {"--positions_path", folder_ / "positions.txt",
-                 "--positions_frame", "own", "--output_frame", frame});
-    return Solve("input", output, more);
+                     Words more = {}) const {
+    return Solve(
+        "input", output,
+        more + Words{"--positions_path", folder_ / "positions.txt",
+                     "--positions_frame", "own", "--output_frame", frame});
   }
   // "NAME1 NAME2 METRES TOLERANCE" at 40 m a unit, times `factor`.
   std::string Distance(size_t a, size_t b, double within,
@@ -64,10 +62,10 @@ class Metres : public Known {
     return line.str();
   }
   KrotResult SolveWith(const std::string& distances, const std::string& output,
-                       std::vector<std::string> more = {}) const {
+                       Words more = {}) const {
     WriteBytes(folder_ / "bars.txt", distances);
-    more.insert(more.end(), {"--distances_path", folder_ / "bars.txt"});
-    return Solve("input", output, more);
+    return Solve("input", output,
+                 more + Words{"--distances_path", folder_ / "bars.txt"});
   }
 
   static constexpr size_t kWrong = 2;
@@ -79,8 +77,7 @@ class Metres : public Known {
 
 TEST_F(Metres, OfPositionsInTheirOwnFrameNameTheWrongOne) {
   WritePositions("0.5");
-  const KrotResult result = SolveIn("model", "output");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(SolveIn("model", "output"));
   EXPECT_THAT(result.err, HasSubstr("the position of " +
                                     model_.images[kWrong].name + " is "));
   EXPECT_THAT(result.err, HasSubstr("m off, its radius is 0.5 m: left out"));
@@ -98,14 +95,13 @@ TEST_F(Metres, OfPositionsInTheirOwnFrameNameTheWrongOne) {
     if (n == kWrong) continue;
     EXPECT_LE((CentreOf(after, n) - CentreOf(model_, n)).norm(), 0.6 / 40);
   }
-  EXPECT_EQ(Check("input", "output").exit_code, 0);
+  Succeeded(Check("input", "output"));
 }
 
 TEST_F(Metres, OfTheWrittenModelAreThePositionsOwnOnRequest) {
   WritePositions("0.5");
-  ASSERT_EQ(SolveIn("model", "model").exit_code, 0);
-  const KrotResult result = SolveIn("own", "own");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(SolveIn("model", "model"));
+  Succeeded(SolveIn("own", "own"));
   const Json in_model = Report("model");
   const Json in_own = Report("own");
   EXPECT_EQ(in_own["positions"]["frame"]["is_written"], true);
@@ -125,8 +121,7 @@ TEST_F(Metres, OfTheWrittenModelAreThePositionsOwnOnRequest) {
 
 TEST_F(Metres, NeedNoRadiusInTheirOwnFrame) {
   WritePositions("");
-  const KrotResult result = SolveIn("own", "output");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(SolveIn("own", "output"));
   EXPECT_THAT(result.err, HasSubstr("as the file has none"));
   EXPECT_EQ(Report("output")["positions"]["frame"]["wrong"].size(), 1u);
 }
@@ -134,9 +129,8 @@ TEST_F(Metres, NeedNoRadiusInTheirOwnFrame) {
 TEST_F(Metres, RefusePositionsThatSayNothingOfAFrame) {
   const auto refuse = [&](const std::string& text, const std::string& part) {
     WriteBytes(folder_ / "positions.txt", text);
-    const KrotResult result = SolveIn("own", "refused");
-    EXPECT_EQ(result.exit_code, 2) << text;
-    EXPECT_THAT(result.err, IsOneSentence("krot solver", part));
+    EXPECT_THAT(SolveIn("own", "refused"), IsRefused(2, "krot solver", part))
+        << text;
   };
   const auto line = [&](size_t n, const std::string& rest) {
     return model_.images[n].name + " " + rest + "\n";
@@ -159,8 +153,7 @@ TEST_F(Metres, RefusePositionsThatSayNothingOfAFrame) {
 }
 
 TEST_F(Metres, OfOneDistanceSetTheScale) {
-  const KrotResult result = SolveWith(Distance(0, 3, 0.01), "output");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(SolveWith(Distance(0, 3, 0.01), "output"));
   const Model after = Load(folder_ / "output");
   EXPECT_NEAR((CentreOf(after, 0) - CentreOf(after, 3)).norm(),
               (Own(0) - Own(3)).norm(), 1e-9);
@@ -168,14 +161,13 @@ TEST_F(Metres, OfOneDistanceSetTheScale) {
   EXPECT_EQ(report["distances"]["is_scale_taken"], true);
   EXPECT_NEAR(Summarize(PixelErrors(after)).max,
               report["pixel_error"]["after"]["max"], 1e-9);
-  EXPECT_EQ(Check("input", "output").exit_code, 0);
+  Succeeded(Check("input", "output"));
 }
 
 TEST_F(Metres, OfSeveralDistancesNameTheOneThatContradicts) {
   const std::string distances =
       Distance(0, 3, 0.5) + Distance(1, 4, 0.5, 1.5) + Distance(2, 5, 0.5);
-  const KrotResult result = SolveWith(distances, "output");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(SolveWith(distances, "output"));
   EXPECT_THAT(result.err,
               HasSubstr("warning: the distance of " + model_.images[1].name +
                         " to " + model_.images[4].name));
@@ -195,9 +187,7 @@ TEST_F(Metres, AreRefusedWhereDistancesHaveNoMajority) {
             "METRES and TOLERANCE"},
            {model_.images[0].name + " " + model_.images[1].name + " nan 1\n",
             "finite numbers"}}) {
-    const KrotResult result = SolveWith(text, "refused");
-    EXPECT_EQ(result.exit_code, 2);
-    EXPECT_THAT(result.err, IsOneSentence("krot solver", part));
+    EXPECT_THAT(SolveWith(text, "refused"), IsRefused(2, "krot solver", part));
   }
 }
 
@@ -205,9 +195,8 @@ TEST_F(Metres, OfDistancesAreCheckedAgainstPositions) {
   WritePositions("0.5");
   WriteBytes(folder_ / "bars.txt",
              Distance(0, 3, 1.5) + Distance(1, 4, 1.5, 1.5));
-  const KrotResult result =
-      SolveIn("own", "output", {"--distances_path", folder_ / "bars.txt"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(
+      SolveIn("own", "output", {"--distances_path", folder_ / "bars.txt"}));
   const Json distances = Report("output")["distances"];
   EXPECT_EQ(distances["is_scale_taken"], false);
   EXPECT_EQ(distances["distances"][0]["is_contradicted"], false);
@@ -215,21 +204,19 @@ TEST_F(Metres, OfDistancesAreCheckedAgainstPositions) {
 }
 
 TEST_F(Metres, OfDistancesAreShownByAnalyzerAndComparer) {
-  ASSERT_EQ(SolveWith(Distance(0, 3, 0.01), "output").exit_code, 0);
-  const KrotResult analyzed = RunKrot(
+  Succeeded(SolveWith(Distance(0, 3, 0.01), "output"));
+  const KrotResult analyzed = Succeeded(RunKrot(
       {"model_analyzer", "--path", folder_ / "output", "--distances_path",
-       folder_ / "bars.txt", "--report_path", folder_ / "a.json"});
-  ASSERT_EQ(analyzed.exit_code, 0) << analyzed.err;
+       folder_ / "bars.txt", "--report_path", folder_ / "a.json"}));
   EXPECT_THAT(analyzed.out, HasSubstr("a unit of the model is 1 m"));
-  const Json report = Json::parse(ReadBytes(folder_ / "a.json"));
+  const Json report = ReadJson(folder_ / "a.json");
   EXPECT_NEAR(report["distances"]["distances"][0]["model"],
               (Own(0) - Own(3)).norm(), 1e-9);
-  const KrotResult compared =
+  Succeeded(
       RunKrot({"model_comparer", "--input_path1", folder_ / "input",
                "--input_path2", folder_ / "output", "--distances_path",
-               folder_ / "bars.txt", "--report_path", folder_ / "c.json"});
-  ASSERT_EQ(compared.exit_code, 0) << compared.err;
-  const Json both = Json::parse(ReadBytes(folder_ / "c.json"))["distances"];
+               folder_ / "bars.txt", "--report_path", folder_ / "c.json"}));
+  const Json both = ReadJson(folder_ / "c.json")["distances"];
   EXPECT_NEAR(both["scales"]["model1"]["metres_per_unit"].get<double>(), 40,
               1e-3);
   EXPECT_NEAR(both["scales"]["model2"]["metres_per_unit"].get<double>(), 1,
@@ -242,13 +229,12 @@ TEST_F(Metres, OfLengthsAreBoundedByToleranceAnalyzer) {
                  model_.images[4].name + "\n" + Distance(2, 5, 0.01, 2));
   const std::string max_error =
       std::to_string(1.2 * Summarize(PixelErrors(model_)).max);
-  const KrotResult result =
+  const KrotResult result = Succeeded(
       RunKrot({"tolerance_analyzer", "--input_path", folder_ / "input",
                "--ToleranceAnalyzer.max_error", max_error,
                "--ToleranceAnalyzer.distances", folder_ / "bars.txt",
-               "--report_path", folder_ / "t.json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const Json report = Json::parse(ReadBytes(folder_ / "t.json"));
+               "--report_path", folder_ / "t.json"}));
+  const Json report = ReadJson(folder_ / "t.json");
   EXPECT_TRUE(report["boxes"].empty());
   ASSERT_EQ(report["lengths"].size(), 3u);
   EXPECT_EQ(report["lengths"][0]["is_bar"], true);

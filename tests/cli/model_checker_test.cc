@@ -7,7 +7,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
-#include <nlohmann/json.hpp>
 
 #include "krot/model.h"
 #include "krot/model/rigs.h"
@@ -19,15 +18,12 @@ namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::StartsWith;
-using Json = nlohmann::json;
 
 class ModelCheckerCommand : public ::testing::Test {
  protected:
   ModelCheckerCommand() {
-    SceneOptions options = SceneOf(8, 400, 6, 0.5);
-    options.random_seed = 3;
+    SceneOptions options = SceneOf(8, 400, 6, 0.5, 3);
     Model model = SynthesizeScene(options).ground_truth;
     Save(model, folder_ / "sound");
     Pose& pose = model.frames[2].rig_from_world;
@@ -38,28 +34,23 @@ class ModelCheckerCommand : public ::testing::Test {
     Save(model, folder_ / "faulty");
   }
 
-  KrotResult Check(const std::string& model,
-                   const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"model_checker", "--input_path",
-                                          folder_ / model};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+  KrotResult Check(const std::string& model, const Words& more = {}) const {
+    return RunKrot({"model_checker", "--input_path", folder_ / model}, more);
   }
 
   // krot's own commands of a table's last part; their names.
-  std::vector<std::string> RunWhatIsNext(const std::string& table) const {
+  Words RunWhatIsNext(const std::string& table) const {
     std::istringstream lines(table);
-    std::vector<std::string> commands;
+    Words commands;
     for (std::string line; std::getline(lines, line);) {
       if (line.rfind("    krot ", 0) != 0) continue;
-      std::vector<std::string> arguments;
+      Words arguments;
       std::istringstream words(line.substr(9));
       for (std::string word; words >> word;) {
         const bool is_folder = word == "CURED" || word == "ADJUSTED";
         arguments.push_back(is_folder ? (folder_ / word).string() : word);
       }
-      const KrotResult next = RunKrot(arguments);
-      EXPECT_EQ(next.exit_code, 0) << line << next.err;
+      Succeeded(RunKrot(arguments));
       commands.push_back(arguments[0]);
     }
     return commands;
@@ -69,19 +60,17 @@ class ModelCheckerCommand : public ::testing::Test {
 };
 
 TEST_F(ModelCheckerCommand, SaysFirstThatNothingIsWrong) {
-  const KrotResult result = Check("sound", {"--fail_on", "wrong"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(Check("sound", {"--fail_on", "wrong"}));
   EXPECT_THAT(result.out, StartsWith("Nothing is wrong: all "));
 }
 
 TEST_F(ModelCheckerCommand, NamesWhatIsWrongAndWritesTheModelWithout) {
-  const KrotResult result =
+  const KrotResult result = Succeeded(
       Check("faulty", {"--output_path", folder_ / "cured", "--report_path",
-                       folder_ / "r.json", "--html_path", folder_ / "r.html"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+                       folder_ / "r.json", "--html_path", folder_ / "r.html"}));
   EXPECT_THAT(result.out, StartsWith("1 of 8 images and 1 of "));
   EXPECT_THAT(result.out, HasSubstr("colmap image_registrator"));
-  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  const Json report = ReadJson(folder_ / "r.json");
   EXPECT_TRUE(report["is_anything_wrong"]);
   EXPECT_THAT(result.out, StartsWith(report["verdict"].get<std::string>()));
   EXPECT_EQ(report["images"][2]["verdict"], "wrong");
@@ -89,16 +78,15 @@ TEST_F(ModelCheckerCommand, NamesWhatIsWrongAndWritesTheModelWithout) {
   const Model cured = Load(folder_ / "cured");
   ValidateModel(cured);
   EXPECT_EQ(cured.images.size(), 7u);
-  EXPECT_EQ(Check("cured", {"--fail_on", "wrong"}).exit_code, 0);
+  Succeeded(Check("cured", {"--fail_on", "wrong"}));
 }
 
 // The tails of the sample's errors are heavier than Gaussian ones.
 TEST_F(ModelCheckerCommand, SaysWhatToRunNextAndThatRuns) {
   const KrotResult result =
-      RunKrot({"model_checker", "--input_path", KROT_SAMPLE "/model",
-               "--report_path", folder_ / "r.json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_GT(Json::parse(ReadBytes(folder_ / "r.json"))["cauchy_scale_px"], 0);
+      Succeeded(RunKrot({"model_checker", "--input_path", KROT_SAMPLE "/model",
+                         "--report_path", folder_ / "r.json"}));
+  EXPECT_GT(ReadJson(folder_ / "r.json")["cauchy_scale_px"], 0);
   EXPECT_THAT(RunWhatIsNext(result.out),
               ElementsAre("model_checker", "bundle_adjuster"));
 }
@@ -112,8 +100,7 @@ TEST_F(ModelCheckerCommand, HasAModelThatIsNotAdjustedAdjustedFirst) {
     shift = -shift;
   }
   Save(model, folder_ / "bent");
-  const KrotResult result = Check("bent");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(Check("bent"));
   EXPECT_THAT(result.out, StartsWith("The model is not adjusted, so "));
   EXPECT_THAT(RunWhatIsNext(result.out),
               ElementsAre("bundle_adjuster", "model_checker"));
@@ -150,18 +137,16 @@ class WrongCameraCommand : public ModelCheckerCommand {
   void ExpectBlamedAndMended(const Model& model, const std::string& fault,
                              const std::string& words) const {
     Save(model, folder_ / "input");
-    const KrotResult held = RunKrot(
-        {"bundle_adjuster", "--input_path", folder_ / "input", "--output_path",
-         folder_ / "held", "--BundleAdjustment.refine_focal_length", "0",
-         "--BundleAdjustment.refine_extra_params", "0",
-         "--BundleAdjustment.refine_sensor_from_rig", "0"});
-    ASSERT_EQ(held.exit_code, 0) << held.err;
+    Succeeded(RunKrot({"bundle_adjuster", "--input_path", folder_ / "input",
+                       "--output_path", folder_ / "held",
+                       "--BundleAdjustment.refine_focal_length", "0",
+                       "--BundleAdjustment.refine_extra_params", "0",
+                       "--BundleAdjustment.refine_sensor_from_rig", "0"}));
     const KrotResult result =
-        Check("held", {"--report_path", folder_ / "r.json"});
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+        Succeeded(Check("held", {"--report_path", folder_ / "r.json"}));
     EXPECT_THAT(result.out, StartsWith("Camera 2 is wrong: " + words));
     EXPECT_THAT(result.out, HasSubstr("\nWrong cameras\n"));
-    const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+    const Json report = ReadJson(folder_ / "r.json");
     ASSERT_EQ(report["cameras"].size(), 1u);
     EXPECT_EQ(report["cameras"][0]["camera_id"], 2);
     EXPECT_EQ(report["cameras"][0]["fault"], fault);
@@ -199,22 +184,19 @@ TEST_F(WrongCameraCommand, IsToldByItsPlaceInTheRig) {
   ExpectBlamedAndMended(
       model, "place in rig",
       "its 20 images ask for another place in its rig, turned by about 0.5");
-  EXPECT_NEAR(
-      Json::parse(ReadBytes(folder_ / "r.json"))["cameras"][0]["turn_deg"],
-      0.573, 0.02);
+  EXPECT_NEAR(ReadJson(folder_ / "r.json")["cameras"][0]["turn_deg"], 0.573,
+              0.02);
 }
 
 TEST_F(ModelCheckerCommand, EndsWithCode9WhereAScriptAsks) {
-  EXPECT_EQ(Check("faulty").exit_code, 0);
+  Succeeded(Check("faulty"));
   EXPECT_EQ(Check("faulty", {"--fail_on", "wrong"}).exit_code, 9);
 }
 
 TEST_F(ModelCheckerCommand, RefusesWhatItCannotJudge) {
   Save(WithoutTranslations(Load(folder_ / "sound")), folder_ / "nowhere");
-  const KrotResult result = Check("nowhere");
-  EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.err,
-              IsOneSentence("krot model_checker", "nothing to check"));
+  EXPECT_THAT(Check("nowhere"),
+              IsRefused(3, "krot model_checker", "nothing to check"));
   EXPECT_EQ(Check("sound", {"--overwrite", "1"}).exit_code, 1);
 }
 

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "krot/analysis/model_statistics.h"
 #include "tests/cli/colmap.h"
@@ -21,8 +20,6 @@ namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
-using ::testing::HasSubstr;
 
 class ModelComparer : public ::testing::Test {
  protected:
@@ -32,20 +29,18 @@ class ModelComparer : public ::testing::Test {
   }
 
   KrotResult Compare(const fs::path& path1, const fs::path& path2,
-                     const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"model_comparer", "--input_path1",
-                                          path1, "--input_path2", path2};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+                     const Words& more = {}) const {
+    return RunKrot(
+        {"model_comparer", "--input_path1", path1, "--input_path2", path2},
+        more);
   }
 
   Json Report(const fs::path& path1, const fs::path& path2,
-              std::vector<std::string> more = {}) const {
-    more.insert(more.end(), {"--report_path", folder_ / "report.json"});
-    const KrotResult result = Compare(path1, path2, more);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+              Words more = {}) const {
+    const KrotResult result = Succeeded(Compare(
+        path1, path2, more + Words{"--report_path", folder_ / "report.json"}));
     EXPECT_EQ(result.err, "");
-    return Json::parse(ReadBytes(folder_ / "report.json"));
+    return ReadJson(folder_ / "report.json");
   }
 
   void ExpectRefused(const KrotResult& result, int exit_code,
@@ -115,14 +110,12 @@ TEST_F(ModelComparer, SaysInItsTableHowItAligned) {
 
 TEST_F(ModelComparer, ShowsWhatACertificateProves) {
   const std::string certificate = folder_ / "certificate.json";
-  ASSERT_EQ(RunKrot({"solver", "--input_path", folder_ / "a", "--output_path",
-                     folder_ / "solved", "--certificate_path", certificate})
-                .exit_code,
-            0);
+  Succeeded(RunKrot({"solver", "--input_path", folder_ / "a", "--output_path",
+                     folder_ / "solved", "--certificate_path", certificate}));
   const Json report = Report(
       folder_ / "a", folder_ / "solved",
       {"--certificate_path1", certificate, "--certificate_path2", certificate});
-  const Json file = Json::parse(ReadBytes(certificate));
+  const Json file = ReadJson(certificate);
   for (const char* model : {"model1", "model2"}) {
     const Json& verdict = report["certificate"][model];
     EXPECT_NEAR(verdict["lower_bound"], file["lower_bound"],
@@ -143,9 +136,8 @@ TEST_F(ModelComparer, ShowsWhatACertificateProves) {
 
 TEST_F(ModelComparer, WritesColmapsErrorFiles) {
   const fs::path output = folder_ / "new/errors";
-  const KrotResult result =
-      Compare(folder_ / "a", folder_ / "b", {"--output_path", output});
-  EXPECT_EQ(result.exit_code, 0);
+  const KrotResult result = Succeeded(
+      Compare(folder_ / "a", folder_ / "b", {"--output_path", output}));
   EXPECT_EQ(ReadBytes(output / "errors_summary.txt"), result.out);
   const Json images = Report(folder_ / "a", folder_ / "b")["images"];
   std::istringstream lines(ReadBytes(output / "errors.csv"));
@@ -185,7 +177,7 @@ TEST_F(ModelComparer, NeedsThreePosesForASimilarityAndOneForAFrame) {
   ExpectRefused(
       Compare(folder_ / "a", folder_ / "few", {"--alignment", "similarity"}), 1,
       "there are 2; use --alignment frame or none");
-  EXPECT_EQ(Compare(folder_ / "a", folder_ / "few").exit_code, 0);
+  Succeeded(Compare(folder_ / "a", folder_ / "few"));
   ExpectRefused(Compare(folder_ / "a", folder_ / "none"), 1,
                 "use --alignment none");
   const Json report =
@@ -200,7 +192,7 @@ TEST_F(ModelComparer, NeedsThreePosesForASimilarityAndOneForAFrame) {
 TEST_F(ModelComparer, RefusesPathsThatItCannotUse) {
   const fs::path a = folder_ / "a";
   const fs::path b = folder_ / "b";
-  const std::vector<std::string> names = FileNames(folder_.path());
+  const Words names = FileNames(folder_.path());
   ExpectRefused(Compare(a, folder_ / "missing"), 2, "missing");
   ExpectRefused(Compare(a, b, {"--overlay_path", b, "--overwrite", "1"}), 1,
                 "must not be a model that is compared");
@@ -227,8 +219,7 @@ TEST_F(ModelComparer, ReplacesAnOverlayOnlyIfTold) {
 }
 
 // What a command of COLMAP prints; fails if it fails.
-std::string Colmap(const std::vector<std::string>& arguments,
-                   const fs::path& log) {
+std::string Colmap(const Words& arguments, const fs::path& log) {
   EXPECT_TRUE(RunColmap(arguments, log)) << ReadBytes(log);
   return ReadBytes(log);
 }
@@ -263,11 +254,9 @@ TEST_F(ModelComparer, OverlaysLegacyAndRigModelsForColmap) {
   for (const auto& [name1, name2] :
        {std::pair("a", "b"), std::pair("rigs", "rigs2")}) {
     for (const char* type : {"BIN", "TXT"}) {
-      const KrotResult result =
-          Compare(folder_ / name1, folder_ / name2,
-                  {"--overlay_path", folder_ / "overlay", "--output_type", type,
-                   "--overwrite", "1"});
-      ASSERT_EQ(result.exit_code, 0) << result.err;
+      Succeeded(Compare(folder_ / name1, folder_ / name2,
+                        {"--overlay_path", folder_ / "overlay", "--output_type",
+                         type, "--overwrite", "1"}));
       ExpectColmapReads(folder_ / "overlay", folder_ / "scratch");
     }
   }
@@ -328,10 +317,8 @@ TEST_F(ModelComparer, ComparesRealModelsWithTheirSolutions) {
   const std::optional<fs::path> real = RealModels();
   if (!real) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
   for (const char* name : {"crane8_txt", "task41_rigs_frames"}) {
-    ASSERT_EQ(RunKrot({"solver", "--input_path", *real / name, "--output_path",
-                       folder_ / "solved", "--overwrite", "1"})
-                  .exit_code,
-              0);
+    Succeeded(RunKrot({"solver", "--input_path", *real / name, "--output_path",
+                       folder_ / "solved", "--overwrite", "1"}));
     // The solver keeps the frame: aligning by it must not move anything.
     const Json report =
         Report(*real / name, folder_ / "solved",

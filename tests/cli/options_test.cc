@@ -5,7 +5,6 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
@@ -15,13 +14,6 @@
 
 namespace krot::internal {
 namespace {
-
-using Words = std::vector<std::string>;
-
-Words operator+(Words words, const Words& more) {
-  words.insert(words.end(), more.begin(), more.end());
-  return words;
-}
 
 class Options : public ::testing::Test {
  protected:
@@ -40,9 +32,8 @@ class Options : public ::testing::Test {
   void ExpectRefused(const std::string& command, const Words& arguments,
                      const std::string& part) const {
     const Words before = FileNames(folder_.path());
-    const KrotResult result = RunKrot(Words{command} + arguments);
-    EXPECT_EQ(result.exit_code, 1);
-    EXPECT_THAT(result.err, IsOneSentence("krot " + command, part));
+    EXPECT_THAT(RunKrot(Words{command} + arguments),
+                IsRefused(1, "krot " + command, part));
     EXPECT_EQ(FileNames(folder_.path()), before);
   }
 
@@ -261,17 +252,16 @@ TEST_F(Options, ThatChooseAScheduleAreTaken) {
               "0.5"},
         Words{"--Solver.method", "joint", "--Solver.relative_gap", "1e-2",
               "--Joint.max_iterations", "100"}}) {
-    const KrotResult result = Solve(more + Words{"--overwrite", "1"});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+    Succeeded(Solve(more + Words{"--overwrite", "1"}));
   }
 }
 
 TEST_F(Options, ForSweepsAloneByNormOrSettingsSaySo) {
   const KrotResult norm = Solve({"--Solver.norm", "3"});
-  EXPECT_THAT(norm.err, ::testing::HasSubstr("this norm has no joint solver"));
+  EXPECT_THAT(norm.err, HasSubstr("this norm has no joint solver"));
   const KrotResult paper =
       Solve({"--Solver.settings", "paper", "--overwrite", "1"});
-  EXPECT_THAT(paper.err, ::testing::HasSubstr("paper settings: sweeps alone"));
+  EXPECT_THAT(paper.err, HasSubstr("paper settings: sweeps alone"));
 }
 
 TEST_F(Options, ThatAreUnknownComeWithTheNearestKnownOne) {
@@ -298,13 +288,12 @@ TEST_F(Options, MustBeCompleteAndUnique) {
 }
 
 TEST_F(Options, OfThePaperAreTakenWithItsSettings) {
-  const KrotResult result = Solve(
+  Succeeded(Solve(
       {"--Solver.settings", "paper", "--FastDescent.stationarity_tolerance",
        "1e-7", "--FastDescent.step_tolerance", "1e-5",
        "--FastDescent.slope_probe=1e-7", "--FastDescent.active_tolerance",
        "1e-3", "--FastDescent.max_step", "5", "--FastDescent.max_iterations",
-       "20", "--ResInt.max_sweeps", "2"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+       "20", "--ResInt.max_sweeps", "2"}));
 }
 
 // The one option of the descent that both settings obey.
@@ -313,14 +302,11 @@ TEST_F(Options, ForIterationsPerBlockCountWithFastSettings) {
                                      "--ResInt.max_sweeps", "1"},
                                Words{"point_triangulator"}}) {
     const auto cost_with = [&](const char* max_iterations) {
-      const KrotResult result = RunKrot(
-          command + Paths() +
-          Words{"--FastDescent.max_iterations", max_iterations, "--overwrite",
-                "1", "--report_path", folder_ / "report.json"});
-      EXPECT_EQ(result.exit_code, 0) << result.err;
-      return nlohmann::json::parse(
-                 ReadBytes(folder_ / "report.json"))["cost_final"]
-          .get<double>();
+      Succeeded(RunKrot(command + Paths() +
+                        Words{"--FastDescent.max_iterations", max_iterations,
+                              "--overwrite", "1", "--report_path",
+                              folder_ / "report.json"}));
+      return ReadJson(folder_ / "report.json")["cost_final"].get<double>();
     };
     EXPECT_GT(cost_with("1"), cost_with("100")) << command[0];
   }
@@ -330,12 +316,11 @@ TEST_F(Options, ComeFromAProjectFileUnlessGivenExplicitly) {
   WriteBytes(folder_ / "project.ini",
              "log_level=0\noutput_type=TXT\noverwrite=false\n"
              "[ResInt]\nmax_sweeps=1\n[Solver]\nmethod=res_int\nnorm=inf\n");
-  const KrotResult result =
-      Solve({"--project_path", folder_ / "project.ini", "--Solver.norm", "1"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(
+      Solve({"--project_path", folder_ / "project.ini", "--Solver.norm", "1"}));
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out, ::testing::HasSubstr("(p = 1)"));
-  EXPECT_THAT(result.out, ::testing::HasSubstr("after 1 sweep"));
+  EXPECT_THAT(result.out, HasSubstr("(p = 1)"));
+  EXPECT_THAT(result.out, HasSubstr("after 1 sweep"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "output/cameras.txt"));
 }
 
@@ -359,9 +344,9 @@ TEST_F(Options, InAProjectFileMayComeFromWindows) {
              "\xef\xbb\xbf; of a colleague\r\noutput_type=txt ; not PLY\r\n"
              "# sweeps\r\n[ResInt]\r\n  ; few\r\nmax_sweeps=1\r\n"
              "[Solver]\r\nmethod=RES_INT\r\n");
-  const KrotResult result = Solve({"--project_path", folder_ / "project.ini"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, ::testing::HasSubstr("after 1 sweep"));
+  const KrotResult result =
+      Succeeded(Solve({"--project_path", folder_ / "project.ini"}));
+  EXPECT_THAT(result.out, HasSubstr("after 1 sweep"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "output/cameras.txt"));
   WriteBytes(folder_ / "utf16.ini", std::string("\xff\xfe[\0S\0", 6));
   ExpectRefused("solver",
@@ -380,8 +365,7 @@ TEST_F(Options, OfColmapsAdjusterAreTakenWhereTheyChangeNothing) {
   const Words adjust =
       Words{"bundle_adjuster", "--BundleAdjustmentCeres.num_threads", "1"} +
       Paths();
-  const KrotResult plain = RunKrot(adjust);
-  ASSERT_EQ(plain.exit_code, 0) << plain.err;
+  Succeeded(RunKrot(adjust));
   const Model expected = Load(folder_ / "output");
   const std::string help = RunKrot({"bundle_adjuster", "-h"}).out;
   for (const std::string group :
@@ -394,10 +378,9 @@ TEST_F(Options, OfColmapsAdjusterAreTakenWhereTheyChangeNothing) {
                  "50"};
     for (const Words& option : without_effect) {
       all = all + Words{group + option[0], option[1]};
-      EXPECT_THAT(help, ::testing::HasSubstr(group.substr(2) + option[0]));
+      EXPECT_THAT(help, HasSubstr(group.substr(2) + option[0]));
     }
-    const KrotResult result = RunKrot(adjust + all);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+    Succeeded(RunKrot(adjust + all));
     EXPECT_THAT(Load(folder_ / "output"), IsModel(expected));
     ExpectRefused("bundle_adjuster", Paths() + Words{group + "use_gpu", "1"},
                   group + "use_gpu = 1, must be 0: KROT adjusts on the CPU");
@@ -418,14 +401,13 @@ TEST_F(Options, OfColmapsEarlyDaysAreAnsweredWithTodays) {
 
 TEST_F(Options, ThatAreWordsMayBeInAnyCase) {
   for (const char* type : {"bin", "Bin", "BIN"}) {
-    EXPECT_EQ(Solve({"--output_type", type, "--overwrite", "1"}).exit_code, 0);
+    Succeeded(Solve({"--output_type", type, "--overwrite", "1"}));
     EXPECT_TRUE(std::filesystem::exists(folder_ / "output/cameras.bin"));
   }
-  const KrotResult loss =
+  Succeeded(
       RunKrot(Words{"bundle_adjuster", "--overwrite", "1",
                     "--BundleAdjustmentCeres.loss_function_type", "cauchy"} +
-              Paths());
-  EXPECT_EQ(loss.exit_code, 0) << loss.err;
+              Paths()));
 }
 
 TEST_F(Options, ForPointsFromMatchesAndFromTracksDoNotMix) {

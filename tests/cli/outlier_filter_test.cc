@@ -8,7 +8,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "krot/model.h"
 #include "tests/cli/krot_process.h"
@@ -16,9 +15,6 @@
 
 namespace krot::internal {
 namespace {
-
-using ::testing::HasSubstr;
-using Json = nlohmann::json;
 
 class OutlierFilterCommand : public ::testing::Test {
  protected:
@@ -28,19 +24,16 @@ class OutlierFilterCommand : public ::testing::Test {
     Save(SynthesizeScene(options).model, folder_ / "input");
   }
 
-  KrotResult Filter(std::vector<std::string> more = {},
-                    const std::string& max_error = "3") const {
-    std::vector<std::string> arguments = {
-        "outlier_filter",   "--input_path",     folder_ / "input",
-        "--output_path",    folder_ / "output", "--report_path",
-        folder_ / "r.json", "--overwrite",      "1"};
+  KrotResult Filter(Words more = {}, const std::string& max_error = "3") const {
     if (!max_error.empty()) {
       more.push_back("--OutlierFilter.max_error=" + max_error);
     }
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+    return RunKrot({"outlier_filter", "--input_path", folder_ / "input",
+                    "--output_path", folder_ / "output", "--report_path",
+                    folder_ / "r.json", "--overwrite", "1"},
+                   more);
   }
-  KrotResult WithoutABound(std::vector<std::string> more) const {
+  KrotResult WithoutABound(Words more) const {
     return Filter(std::move(more), "");
   }
   KrotResult Check(const std::string& file) const {
@@ -52,10 +45,10 @@ class OutlierFilterCommand : public ::testing::Test {
 };
 
 TEST_F(OutlierFilterCommand, PrintsABracketWhoseProofTheCheckerAccepts) {
-  const KrotResult result = Filter({"--conflicts_path", folder_ / "c.json",
-                                    "--outliers_path", folder_ / "o.csv"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  const KrotResult result =
+      Succeeded(Filter({"--conflicts_path", folder_ / "c.json",
+                        "--outliers_path", folder_ / "o.csv"}));
+  const Json report = ReadJson(folder_ / "r.json");
   const int removed = report["num_removed"];
   const int must_go = report["num_must_go"];
   EXPECT_GT(must_go, 0);
@@ -72,20 +65,18 @@ TEST_F(OutlierFilterCommand, PrintsABracketWhoseProofTheCheckerAccepts) {
   const std::string csv = ReadBytes(folder_ / "o.csv");
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), removed + 1);
 
-  const KrotResult check = Check("c.json");
-  EXPECT_EQ(check.exit_code, 0) << check.err;
+  const KrotResult check = Succeeded(Check("c.json"));
   EXPECT_THAT(check.out, HasSubstr("at least " + std::to_string(must_go) +
                                    " observation"));
 }
 
 TEST_F(OutlierFilterCommand, IsRefusedByTheCheckerOnceItsFileIsTamperedWith) {
-  ASSERT_EQ(Filter({"--conflicts_path", folder_ / "c.json"}).exit_code, 0);
-  Json json = Json::parse(ReadBytes(folder_ / "c.json"));
+  Succeeded(Filter({"--conflicts_path", folder_ / "c.json"}));
+  Json json = ReadJson(folder_ / "c.json");
   json["conflicts"].push_back(json["conflicts"][0]);
   std::ofstream(folder_ / "twice.json") << json;
-  const KrotResult twice = Check("twice.json");
-  EXPECT_EQ(twice.exit_code, 4);
-  EXPECT_THAT(twice.err, IsOneSentence("krot certificate_checker", "refused"));
+  EXPECT_THAT(Check("twice.json"),
+              IsRefused(4, "krot certificate_checker", "refused"));
   json["conflicts"].erase(json["conflicts"].size() - 1);
   json["conflicts"][0].erase("rows_bound");
   std::ofstream(folder_ / "less.json") << json;
@@ -93,9 +84,8 @@ TEST_F(OutlierFilterCommand, IsRefusedByTheCheckerOnceItsFileIsTamperedWith) {
 }
 
 TEST_F(OutlierFilterCommand, ProvesNothingByTheThreshold) {
-  const KrotResult result = Filter({"--OutlierFilter.method", "threshold"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  Succeeded(Filter({"--OutlierFilter.method", "threshold"}));
+  const Json report = ReadJson(folder_ / "r.json");
   EXPECT_TRUE(report["num_must_go"].is_null());
   EXPECT_TRUE(report["is_within"]);
   EXPECT_EQ(Filter({"--OutlierFilter.method", "threshold", "--conflicts_path",
@@ -107,11 +97,10 @@ TEST_F(OutlierFilterCommand, ProvesNothingByTheThreshold) {
 TEST_F(OutlierFilterCommand, TakesItsBoundFromTheElbowOfTheProfile) {
   const std::string profile = folder_ / "profile.json";
   const KrotResult result =
-      WithoutABound({"--conflicts_path", folder_ / "c.json",
-                     "--OutlierFilter.profile_path", profile});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const Json json = Json::parse(ReadBytes(profile));
-  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+      Succeeded(WithoutABound({"--conflicts_path", folder_ / "c.json",
+                               "--OutlierFilter.profile_path", profile}));
+  const Json json = ReadJson(profile);
+  const Json report = ReadJson(folder_ / "r.json");
   EXPECT_EQ(report["profile"]["levels"], json["levels"]);
   const Json& levels = json["levels"];
   ASSERT_FALSE(json["elbow"].is_null());
@@ -133,22 +122,21 @@ TEST_F(OutlierFilterCommand, TakesItsBoundFromTheElbowOfTheProfile) {
             0.5 * levels[0]["max_error"].get<double>());
   EXPECT_NE(result.out.find("made the profile in "), std::string::npos)
       << result.out;
-  EXPECT_EQ(Check("c.json").exit_code, 0);
+  Succeeded(Check("c.json"));
 }
 
 // Everything above what noise explains goes; nothing else has to.
 TEST_F(OutlierFilterCommand, ChoosesItsBoundByTheNoise) {
   const KrotResult result =
-      WithoutABound({"--OutlierFilter.method", "conflicts", "--conflicts_path",
-                     folder_ / "c.json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+      Succeeded(WithoutABound({"--OutlierFilter.method", "conflicts",
+                               "--conflicts_path", folder_ / "c.json"}));
+  const Json report = ReadJson(folder_ / "r.json");
   EXPECT_GT(report["num_must_go"], 0);
   EXPECT_EQ(report["max_error"], report["noise"]["max_error"]);
   EXPECT_GT(report["noise"]["lower_bound"], report["max_error"]);
   EXPECT_TRUE(report["is_within"]);
   EXPECT_THAT(result.out, HasSubstr("such noise is not all"));
-  EXPECT_EQ(Check("c.json").exit_code, 0);
+  Succeeded(Check("c.json"));
 }
 
 TEST_F(OutlierFilterCommand, CallsNoObservationOfNoiseWrong) {
@@ -158,19 +146,17 @@ TEST_F(OutlierFilterCommand, CallsNoObservationOfNoiseWrong) {
     options.start_translation_noise = options.start_point_noise = 0;
     Save(SynthesizeScene(options).model, folder_ / "input");
     const KrotResult result =
-        WithoutABound({"--OutlierFilter.method", "conflicts",
-                       "--conflicts_path", folder_ / "c.json"});
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+        Succeeded(WithoutABound({"--OutlierFilter.method", "conflicts",
+                                 "--conflicts_path", folder_ / "c.json"}));
     EXPECT_THAT(result.out, HasSubstr("removed 0 of "));
     EXPECT_THAT(result.out, HasSubstr("no elbow"));
-    const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+    const Json report = ReadJson(folder_ / "r.json");
     EXPECT_TRUE(report["max_error"].is_null());
     for (const char* name : {"images.bin", "points3D.bin"}) {
       EXPECT_EQ(ReadBytes(folder_ / "output" / name),
                 ReadBytes(folder_ / "input" / name));
     }
-    const KrotResult check = Check("c.json");
-    EXPECT_EQ(check.exit_code, 0) << check.err;
+    const KrotResult check = Succeeded(Check("c.json"));
     EXPECT_THAT(check.out, HasSubstr("at least 0 observations must go"));
   }
 }
@@ -181,8 +167,7 @@ TEST_F(OutlierFilterCommand, DoubtsMoreThanObservationsWhereAllErrorsAreLarge) {
     options.pixel_noise = pixel_noise;
     Save(SynthesizeScene(options).model, folder_ / "input");
     const KrotResult result =
-        WithoutABound({"--OutlierFilter.method", "conflicts"});
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+        Succeeded(WithoutABound({"--OutlierFilter.method", "conflicts"}));
     EXPECT_EQ(
         result.out.find("rotations, intrinsics or matches may be wrong") !=
             std::string::npos,
@@ -195,26 +180,21 @@ TEST_F(OutlierFilterCommand, SaysThatThereIsNoElbowWhateverTheBound) {
   SceneOptions options = SmallScene();
   options.pixel_noise = 1;
   Save(SynthesizeScene(options).model, folder_ / "input");
-  const KrotResult result =
-      Filter({"--OutlierFilter.profile_path", folder_ / "profile.json"}, "1");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(
+      Filter({"--OutlierFilter.profile_path", folder_ / "profile.json"}, "1"));
   EXPECT_THAT(result.out, HasSubstr("there is no elbow"));
-  EXPECT_THAT(result.out, ::testing::Not(HasSubstr("called wrong")));
-  EXPECT_TRUE(
-      Json::parse(ReadBytes(folder_ / "profile.json"))["elbow"].is_null());
+  EXPECT_THAT(result.out, Not(HasSubstr("called wrong")));
+  EXPECT_TRUE(ReadJson(folder_ / "profile.json")["elbow"].is_null());
 }
 
 TEST_F(OutlierFilterCommand, NeedsABoundForTheThreshold) {
-  const KrotResult result =
-      WithoutABound({"--OutlierFilter.method", "threshold"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, IsOneSentence("krot outlier_filter", "is required"));
+  EXPECT_THAT(WithoutABound({"--OutlierFilter.method", "threshold"}),
+              IsRefused(1, "krot outlier_filter", "is required"));
 }
 
 TEST_F(OutlierFilterCommand, SaysWhatItDoesInEveryPhase) {
-  const KrotResult result = WithoutABound(
-      {"--OutlierFilter.method", "conflicts", "--log_level", "2"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(WithoutABound(
+      {"--OutlierFilter.method", "conflicts", "--log_level", "2"}));
   for (const char* phase :
        {"reading ", "measuring the noise", "comparing the errors with noise",
         "choosing what to remove", "conflicts of removed observations: ",
@@ -225,20 +205,18 @@ TEST_F(OutlierFilterCommand, SaysWhatItDoesInEveryPhase) {
 
 TEST_F(OutlierFilterCommand, DrawsItsProfileDownToTheBoundThatIsGiven) {
   const std::string profile = folder_ / "profile.json";
-  const KrotResult result = Filter({"--OutlierFilter.profile_path", profile});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const Json levels = Json::parse(ReadBytes(profile))["levels"];
+  Succeeded(Filter({"--OutlierFilter.profile_path", profile}));
+  const Json levels = ReadJson(profile)["levels"];
   EXPECT_LE(levels.back()["max_error"].get<double>(), 3);
-  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  const Json report = ReadJson(folder_ / "r.json");
   EXPECT_EQ(report["max_error"], 3);
   EXPECT_EQ(report["num_removed"], levels.back()["num_removed"]);
 }
 
 TEST_F(OutlierFilterCommand, WritesModelsToLookAt) {
-  const KrotResult result = Filter({"--suspects_path", folder_ / "suspects",
-                                    "--overlay_path", folder_ / "overlay"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  Succeeded(Filter({"--suspects_path", folder_ / "suspects", "--overlay_path",
+                    folder_ / "overlay"}));
+  const Json report = ReadJson(folder_ / "r.json");
   const Model input = Load(folder_ / "input");
   const Model suspects = Load(folder_ / "suspects");
   const size_t num_kept = Load(folder_ / "output").points3D.size();
@@ -266,10 +244,8 @@ TEST_F(OutlierFilterCommand, LeavesTwinsOfAnImageToTheEnd) {
   options.duplicate_ratio = 0.1;
   Save(SynthesizeScene(options).model, folder_ / "input");
   const auto removed = [&](const std::string& same_image) {
-    const KrotResult result =
-        Filter({"--Problem.same_image", same_image}, "0.1");
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+    Succeeded(Filter({"--Problem.same_image", same_image}, "0.1"));
+    const Json report = ReadJson(folder_ / "r.json");
     EXPECT_TRUE(report["is_within"]);
     return std::pair<int, int>(report["num_removed"], report["num_must_go"]);
   };
@@ -289,16 +265,15 @@ TEST_F(OutlierFilterCommand, RefusesABoundThatIsNoPositiveNumber) {
 }
 
 TEST_F(OutlierFilterCommand, WithoutABoundRemovesWhatNoiseDoesNotExplain) {
-  const std::vector<std::string> arguments = {
+  const Words arguments = {
       "outlier_filter",   "--input_path",     folder_ / "input",
       "--output_path",    folder_ / "output", "--report_path",
       folder_ / "r.json", "--outliers_path",  folder_ / "o.csv",
       "--html_path",      folder_ / "r.html", "--conflicts_path",
       folder_ / "c.json"};
-  const KrotResult result = RunKrot(arguments);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(RunKrot(arguments));
   EXPECT_THAT(result.out, HasSubstr("is more than noise of "));
-  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  const Json report = ReadJson(folder_ / "r.json");
   EXPECT_EQ(report["method"], "snooping");
   EXPECT_TRUE(report["max_error"].is_null());
   const int must_go = report["num_must_go"];
@@ -306,8 +281,7 @@ TEST_F(OutlierFilterCommand, WithoutABoundRemovesWhatNoiseDoesNotExplain) {
   EXPECT_LE(must_go, report["num_removed"]);
   EXPECT_THAT(result.out, HasSubstr("That at least " + std::to_string(must_go) +
                                     " observations must go is proved"));
-  const KrotResult check = Check("c.json");
-  EXPECT_EQ(check.exit_code, 0) << check.err;
+  const KrotResult check = Succeeded(Check("c.json"));
   EXPECT_THAT(check.out, HasSubstr("at least " + std::to_string(must_go) +
                                    " observations must go"));
   EXPECT_THAT(check.out, HasSubstr("their own bounds in the file"));

@@ -20,21 +20,13 @@ class Output : public ::testing::Test {
  protected:
   Output() { Save(SmallLegacyModel(), folder_ / "input"); }
 
-  KrotResult Solve(const fs::path& output,
-                   const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"solver",
-                                          "--input_path",
-                                          folder_ / "input",
-                                          "--output_path",
-                                          output,
-                                          "--ResInt.max_sweeps",
-                                          "1"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+  KrotResult Solve(const fs::path& output, const Words& more = {}) const {
+    return RunKrot({"solver", "--input_path", folder_ / "input",
+                    "--output_path", output, "--ResInt.max_sweeps", "1"},
+                   more);
   }
 
-  void ExpectNotWritten(const KrotResult& result,
-                        const std::vector<std::string>& names,
+  void ExpectNotWritten(const KrotResult& result, const Words& names,
                         const std::string& part) const {
     EXPECT_EQ(result.exit_code, 5);
     EXPECT_THAT(result.err, IsOneSentence("krot solver", part));
@@ -46,7 +38,7 @@ class Output : public ::testing::Test {
 
 TEST_F(Output, ThatCannotBeWrittenIsRefusedBeforeTheSolve) {
   WriteBytes(folder_ / "file", "");
-  const std::vector<std::string> names = FileNames(folder_.path());
+  const Words names = FileNames(folder_.path());
   ExpectNotWritten(Solve(folder_ / "file"), names, "file");
   ExpectNotWritten(Solve(folder_ / "file/model"), names, "file");
   const auto report = [&](const fs::path& path) {
@@ -63,15 +55,13 @@ TEST_F(Output, ThatCannotBeWrittenIsRefusedBeforeTheSolve) {
 
 // Splatting programs read it and not points3D.bin.
 TEST_F(Output, NamesAPlyThatIsOfAnotherModel) {
-  EXPECT_THAT(Solve(folder_ / "output").err,
-              ::testing::Not(::testing::HasSubstr("points3D.ply")));
+  EXPECT_THAT(Solve(folder_ / "output").err, Not(HasSubstr("points3D.ply")));
   const fs::path ply = folder_ / "output/points3D.ply";
   WriteBytes(ply, "ply of the model before");
-  const KrotResult result = Solve(folder_ / "output", {"--overwrite", "1"});
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.err,
-              ::testing::HasSubstr("warning: " + ply.string() +
-                                   " is older than the model beside it"));
+  const KrotResult result =
+      Succeeded(Solve(folder_ / "output", {"--overwrite", "1"}));
+  EXPECT_THAT(result.err, HasSubstr("warning: " + ply.string() +
+                                    " is older than the model beside it"));
   EXPECT_EQ(ReadBytes(ply), "ply of the model before");
 }
 
@@ -79,36 +69,33 @@ TEST_F(Output, ReplacesAModelOnlyIfTold) {
   Save(SmallLegacyModel(), folder_ / "output", ModelFormat::kText);
   WriteBytes(folder_ / "output/notes.md", "mine");
   const std::string before = ReadBytes(folder_ / "output/images.txt");
-  const KrotResult refused = Solve(folder_ / "output");
-  EXPECT_EQ(refused.exit_code, 5);
-  EXPECT_THAT(refused.err, IsOneSentence("krot solver", "overwrite"));
+  EXPECT_THAT(Solve(folder_ / "output"),
+              IsRefused(5, "krot solver", "overwrite"));
   EXPECT_EQ(ReadBytes(folder_ / "output/images.txt"), before);
 
-  EXPECT_EQ(Solve(folder_ / "output", {"--overwrite", "1"}).exit_code, 0);
+  Succeeded(Solve(folder_ / "output", {"--overwrite", "1"}));
   EXPECT_EQ(FileNames(folder_ / "output"),
-            (std::vector<std::string>{"cameras.bin", "images.bin", "notes.md",
-                                      "points3D.bin"}));
+            (Words{"cameras.bin", "images.bin", "notes.md", "points3D.bin"}));
   EXPECT_EQ(ReadBytes(folder_ / "output/notes.md"), "mine");
-  EXPECT_EQ(FileNames(folder_.path()),
-            (std::vector<std::string>{"input", "output"}));
+  EXPECT_EQ(FileNames(folder_.path()), (Words{"input", "output"}));
 }
 
 TEST_F(Output, MayBeTheInput) {
   const Model before = Load(folder_ / "input");
-  EXPECT_EQ(Solve(folder_ / "input", {"--overwrite", "true"}).exit_code, 0);
-  EXPECT_THAT(Load(folder_ / "input"), ::testing::Not(IsModel(before)));
+  Succeeded(Solve(folder_ / "input", {"--overwrite", "true"}));
+  EXPECT_THAT(Load(folder_ / "input"), Not(IsModel(before)));
 }
 
 TEST_F(Output, TakesTheInputsFormatUnlessTold) {
   WriteBytes(folder_ / "input/project.ini", "image_path=images\n");
-  ASSERT_EQ(Solve(folder_ / "auto").exit_code, 0);
-  ASSERT_EQ(Solve(folder_ / "text", {"--output_type", "TXT"}).exit_code, 0);
-  EXPECT_EQ(FileNames(folder_ / "auto"),
-            (std::vector<std::string>{"cameras.bin", "images.bin",
-                                      "points3D.bin", "project.ini"}));
-  EXPECT_EQ(FileNames(folder_ / "text"),
-            (std::vector<std::string>{"cameras.txt", "images.txt",
-                                      "points3D.txt", "project.ini"}));
+  Succeeded(Solve(folder_ / "auto"));
+  Succeeded(Solve(folder_ / "text", {"--output_type", "TXT"}));
+  EXPECT_EQ(
+      FileNames(folder_ / "auto"),
+      (Words{"cameras.bin", "images.bin", "points3D.bin", "project.ini"}));
+  EXPECT_EQ(
+      FileNames(folder_ / "text"),
+      (Words{"cameras.txt", "images.txt", "points3D.txt", "project.ini"}));
   EXPECT_THAT(Load(folder_ / "text"), IsModel(Load(folder_ / "auto")));
 }
 
@@ -117,27 +104,25 @@ TEST_F(Output, AsTextWarnsOfNamesThatColmapWouldCut) {
   model.images[0].name = "a photo.jpg";
   Save(model, folder_ / "input");
   EXPECT_THAT(Solve(folder_ / "text", {"--output_type", "TXT"}).err,
-              ::testing::HasSubstr("warning: 1 image name with white space"));
+              HasSubstr("warning: 1 image name with white space"));
   EXPECT_EQ(Load(folder_ / "text").images[0].name, "a photo.jpg");
 }
 
 TEST_F(Output, HoldsTheReportIfToldSo) {
   const fs::path report = folder_ / "output/report.json";
-  ASSERT_EQ(Solve(folder_ / "output", {"--report_path", report}).exit_code, 0);
-  EXPECT_THAT(ReadBytes(report), ::testing::HasSubstr("\"cost_final\""));
+  Succeeded(Solve(folder_ / "output", {"--report_path", report}));
+  EXPECT_THAT(ReadBytes(report), HasSubstr("\"cost_final\""));
   // And replaces it next time, with nothing left beside it.
-  ASSERT_EQ(
-      Solve(folder_ / "output", {"--report_path", report, "--overwrite", "1"})
-          .exit_code,
-      0);
-  EXPECT_EQ(FileNames(folder_ / "output"),
-            (std::vector<std::string>{"cameras.bin", "images.bin",
-                                      "points3D.bin", "report.json"}));
+  Succeeded(
+      Solve(folder_ / "output", {"--report_path", report, "--overwrite", "1"}));
+  EXPECT_EQ(
+      FileNames(folder_ / "output"),
+      (Words{"cameras.bin", "images.bin", "points3D.bin", "report.json"}));
 }
 
 // A solve is not thrown away with its report.
 TEST_F(Output, KeepsModelAndCertificateWhereTheReportCannotBeWritten) {
-  ASSERT_EQ(Solve(folder_ / "expected").exit_code, 0);
+  Succeeded(Solve(folder_ / "expected"));
   // Short enough for a name, too long with what it is called until complete.
   const fs::path report = folder_ / std::string(250, 'r');
   const KrotResult result =
@@ -148,15 +133,14 @@ TEST_F(Output, KeepsModelAndCertificateWhereTheReportCannotBeWritten) {
   EXPECT_THAT(result.err, ::testing::EndsWith("cannot be written: File name "
                                               "too long\n"));
   EXPECT_EQ(FileNames(folder_.path()),
-            (std::vector<std::string>{"certificate.json", "expected", "input",
-                                      "output"}));
+            (Words{"certificate.json", "expected", "input", "output"}));
   EXPECT_THAT(Load(folder_ / "output"), IsModel(Load(folder_ / "expected")));
 }
 
 // The options of a log that are not defaults, but for where things go.
-std::vector<std::string> LoggedOptions(const std::string& log) {
+Words LoggedOptions(const std::string& log) {
   std::istringstream lines(log);
-  std::vector<std::string> options;
+  Words options;
   for (std::string line; std::getline(lines, line);) {
     if (line.rfind("--", 0) != 0) continue;
     if (line.find("  (default)") != std::string::npos) continue;
@@ -169,19 +153,17 @@ std::vector<std::string> LoggedOptions(const std::string& log) {
 
 TEST_F(Output, CanBeMadeAgainFromTheLog) {
   const fs::path file = folder_ / "run.log";
-  ASSERT_EQ(Solve(folder_ / "a", {"--log_path", file, "--log_level", "0",
-                                  "--Solver.finish", "none"})
-                .exit_code,
-            0);
+  Succeeded(Solve(folder_ / "a", {"--log_path", file, "--log_level", "0",
+                                  "--Solver.finish", "none"}));
   const std::string log = ReadBytes(file);
   EXPECT_THAT(log, ::testing::StartsWith("krot solver, version "));
-  EXPECT_THAT(log, ::testing::HasSubstr("sweep 1: cost "));
-  EXPECT_THAT(log, ::testing::HasSubstr("max error"));
+  EXPECT_THAT(log, HasSubstr("sweep 1: cost "));
+  EXPECT_THAT(log, HasSubstr("max error"));
   EXPECT_THAT(log, ::testing::EndsWith("s  exit code 0\n"));
 
-  std::vector<std::string> again = {"solver", "--output_path", folder_ / "b"};
+  Words again = {"solver", "--output_path", folder_ / "b"};
   for (const std::string& option : LoggedOptions(log)) again.push_back(option);
-  ASSERT_EQ(RunKrot(again).exit_code, 0);
+  Succeeded(RunKrot(again));
   EXPECT_THAT(Load(folder_ / "b"), IsModel(Load(folder_ / "a")));
 }
 
@@ -195,25 +177,25 @@ TEST_F(Output, IsLoggedWithTheDigestsOfWhatWasReadAndTheRefusal) {
   ASSERT_EQ(std::fread(digest, 1, 64, sum.get()), 64u);
   fs::resize_file(folder_ / "input/points3D.bin", 20);
   EXPECT_EQ(Solve(folder_ / "a", {"--log_path", file}).exit_code, 2);
-  EXPECT_THAT(ReadBytes(file), ::testing::HasSubstr(digest));
-  EXPECT_THAT(ReadBytes(file), ::testing::HasSubstr("krot solver: "));
+  EXPECT_THAT(ReadBytes(file), HasSubstr(digest));
+  EXPECT_THAT(ReadBytes(file), HasSubstr("krot solver: "));
   EXPECT_THAT(ReadBytes(file), ::testing::EndsWith("s  exit code 2\n"));
 }
 
 TEST_F(Output, SplitsTablesFromProgress) {
   const KrotResult usual = Solve(folder_ / "a");
-  EXPECT_THAT(usual.out, ::testing::HasSubstr("max error"));
-  EXPECT_THAT(usual.out, ::testing::Not(::testing::HasSubstr("sweep 1:")));
-  EXPECT_THAT(usual.err, ::testing::HasSubstr("sweep 1: cost "));
-  EXPECT_THAT(usual.err, ::testing::HasSubstr("will be needed"));
+  EXPECT_THAT(usual.out, HasSubstr("max error"));
+  EXPECT_THAT(usual.out, Not(HasSubstr("sweep 1:")));
+  EXPECT_THAT(usual.err, HasSubstr("sweep 1: cost "));
+  EXPECT_THAT(usual.err, HasSubstr("will be needed"));
 
   const KrotResult to_stderr = Solve(folder_ / "b", {"--log_to_stderr", "1"});
   EXPECT_EQ(to_stderr.out, "");
-  EXPECT_THAT(to_stderr.err, ::testing::HasSubstr("max error"));
+  EXPECT_THAT(to_stderr.err, HasSubstr("max error"));
 
   EXPECT_EQ(Solve(folder_ / "c", {"--log_level", "0"}).err, "");
   EXPECT_THAT(Solve(folder_ / "d", {"--log_level", "2"}).err,
-              ::testing::HasSubstr("writing " + (folder_ / "d").string()));
+              HasSubstr("writing " + (folder_ / "d").string()));
 }
 
 }  // namespace

@@ -14,8 +14,6 @@
 namespace krot::internal {
 namespace {
 
-using ::testing::HasSubstr;
-
 // Where the images of SmallLegacyModel are known to be.
 class KnownPositions : public Known {
  protected:
@@ -36,10 +34,8 @@ class KnownPositions : public Known {
            << '\n';
     }
   }
-  std::vector<std::string> Options(std::vector<std::string> more = {
-                                       "--overwrite", "1"}) const {
-    more.insert(more.end(), {"--positions_path", folder_ / "positions.txt"});
-    return more;
+  Words Options(Words more = {"--overwrite", "1"}) const {
+    return more + Words{"--positions_path", folder_ / "positions.txt"};
   }
 
   static constexpr size_t kWrong = 2;
@@ -49,8 +45,7 @@ class KnownPositions : public Known {
 TEST_F(KnownPositions, AreKeptAndProved) {
   constexpr double kRadius = 1e-3;
   WritePositions(kRadius, 5 * kRadius);
-  const KrotResult result = Solve("input", "output", Options());
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(Solve("input", "output", Options()));
   EXPECT_THAT(result.out, HasSubstr("with these positions, no translations"));
   EXPECT_THAT(result.out, HasSubstr("Known positions that hold against"));
   const Json report = Report("output");
@@ -64,8 +59,7 @@ TEST_F(KnownPositions, AreKeptAndProved) {
     if (n == kWrong) xyz.x() += 5 * kRadius;
     EXPECT_LE((CentreOf(after, n) - xyz).norm(), (1 + 1e-6) * kRadius);
   }
-  const KrotResult check = Check("output", "output");
-  EXPECT_EQ(check.exit_code, 0) << check.err;
+  const KrotResult check = Succeeded(Check("output", "output"));
   EXPECT_THAT(check.out, HasSubstr("to be kept to the radii below"));
 }
 
@@ -79,21 +73,19 @@ TEST_F(KnownPositions, OfPointsAndWithAxesAreKeptAndProved) {
          << own[2].id << ' ' << own[2].xyz.transpose()
          << " .001 .002 .003 1 0 0 .5\n";
   points.close();
-  const KrotResult result =
-      Solve("input", "output",
-            Options({"--point_positions_path", folder_ / "points.txt"}));
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(Solve("input", "output",
+                  Options({"--point_positions_path", folder_ / "points.txt"})));
   EXPECT_EQ(Report("output")["positions"]["num_known"],
             model_.images.size() + 3);
   const Model after = Load(folder_ / "output");
   EXPECT_LE((after.points3D[0].xyz - own[0].xyz).norm(), (1 + 1e-6) * 1e-3);
-  EXPECT_EQ(Check("output", "output").exit_code, 0);
+  Succeeded(Check("output", "output"));
 }
 
 // As other programs write them, of photos that were not all registered.
 TEST_F(KnownPositions, OfOtherProgramsAreTheSame) {
   WritePositions(1e-3, 5e-3);
-  ASSERT_EQ(Solve("input", "expected", Options()).exit_code, 0);
+  Succeeded(Solve("input", "expected", Options()));
   std::istringstream lines(ReadBytes(folder_ / "positions.txt"));
   std::string text =
       "\xef\xbb\xbfphoto,x,y,z\r\nE:\\photos\\lost.jpg,1,2,3\r\n";
@@ -104,9 +96,8 @@ TEST_F(KnownPositions, OfOtherProgramsAreTheSame) {
     text += "E:\\photos\\" + line + "\r\n";
   }
   WriteBytes(folder_ / "positions.txt", text);
-  const KrotResult result =
-      Solve("input", "output", Options({"--Problem.position_radius", "1e-3"}));
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(
+      Solve("input", "output", Options({"--Problem.position_radius", "1e-3"})));
   EXPECT_THAT(result.err, HasSubstr("warning: "));
   EXPECT_THAT(result.err, HasSubstr("skipped 1 of " +
                                     std::to_string(model_.images.size() + 1) +
@@ -118,23 +109,19 @@ TEST_F(KnownPositions, OfOtherProgramsAreTheSame) {
 
 TEST_F(KnownPositions, AreInflatedByTheSmallestFactorThatIsEnough) {
   WritePositions(1e-3, 5e-3);
-  const KrotResult as_given = Solve("input", "given", Options());
-  ASSERT_EQ(as_given.exit_code, 0) << as_given.err;
+  Succeeded(Solve("input", "given", Options()));
   const double bound = Report("given")["lower_bound"];
-  const KrotResult result =
+  const KrotResult result = Succeeded(
       Solve("input", "output",
             Options({"--Problem.inflate_positions", std::to_string(0.9 * bound),
-                     "--factor_certificate_path", folder_ / "factor.json"}));
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+                     "--factor_certificate_path", folder_ / "factor.json"})));
   EXPECT_THAT(result.out, HasSubstr("All radii are multiplied by "));
   const Json factor = Report("output")["positions"]["factor"];
   EXPECT_GT(factor["lower_bound"], 1);
   EXPECT_LE(factor["value"], 1.01 * factor["lower_bound"].get<double>());
   EXPECT_LE(Report("output")["cost_final"], 0.9 * bound + 1e-6);
-  const KrotResult check =
-      RunKrot({"certificate_checker", "--input_path", folder_ / "input",
-               "--certificate_path", folder_ / "factor.json"});
-  EXPECT_EQ(check.exit_code, 0) << check.err;
+  Succeeded(RunKrot({"certificate_checker", "--input_path", folder_ / "input",
+                     "--certificate_path", folder_ / "factor.json"}));
 
   const KrotResult refused = Solve(
       "input", "refused", Options({"--Problem.inflate_positions", "1e-3"}));
@@ -148,8 +135,7 @@ TEST_F(KnownPositions, ThatCannotBeKeptAreNamedAndRefuted) {
   EXPECT_EQ(result.exit_code, 7);
   EXPECT_THAT(result.err, HasSubstr("in conflict are the positions of "));
   EXPECT_THAT(result.err, HasSubstr(model_.images[kWrong].name));
-  const KrotResult check = Check("input", "output");
-  EXPECT_EQ(check.exit_code, 0) << check.err;
+  Succeeded(Check("input", "output"));
 }
 
 TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
@@ -175,9 +161,7 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
            {name + " 1 2 3 4\n" + name + " 1 2 3 4\n", "line 1 names it"},
            {"\n", "found no line"}}) {
     SCOPED_TRACE(text);
-    const KrotResult result = solve(text);
-    EXPECT_EQ(result.exit_code, 2);
-    EXPECT_THAT(result.err, IsOneSentence("krot solver", part));
+    EXPECT_THAT(solve(text), IsRefused(2, "krot solver", part));
   }
   for (const auto& [text, part] :
        std::vector<std::pair<std::string, std::string>>{
@@ -189,10 +173,9 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
            {"", "found no line"}}) {
     SCOPED_TRACE(text);
     std::ofstream(folder_ / "points.txt") << text;
-    const KrotResult result = Solve(
-        "input", "output", {"--point_positions_path", folder_ / "points.txt"});
-    EXPECT_EQ(result.exit_code, 2);
-    EXPECT_THAT(result.err, IsOneSentence("krot solver", part));
+    EXPECT_THAT(Solve("input", "output",
+                      {"--point_positions_path", folder_ / "points.txt"}),
+                IsRefused(2, "krot solver", part));
   }
   const KrotResult none =
       Solve("input", "output", {"--Problem.inflate_positions", "1"});
@@ -204,10 +187,9 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
   EXPECT_THAT(no_list.err,
               HasSubstr("--Problem.position_radius has no effect"));
   WritePositions(1, 0);
-  for (const std::vector<std::string>& options :
-       std::vector<std::vector<std::string>>{{"--Solver.max_error", "3"},
-                                             {"--Solver.norm", "1"},
-                                             {"--Solver.polish", "full"}}) {
+  for (const Words& options : std::vector<Words>{{"--Solver.max_error", "3"},
+                                                 {"--Solver.norm", "1"},
+                                                 {"--Solver.polish", "full"}}) {
     const KrotResult result = Solve("input", "output", Options(options));
     EXPECT_EQ(result.exit_code, 1);
     EXPECT_THAT(result.err, HasSubstr("--positions_path has no effect"));

@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "krot/model.h"
 #include "tests/cli/krot_process.h"
@@ -15,9 +14,6 @@
 namespace krot::internal {
 namespace {
 
-using ::testing::HasSubstr;
-using Json = nlohmann::json;
-
 class RawTracks : public ::testing::Test {
  protected:
   RawTracks() {
@@ -28,23 +24,21 @@ class RawTracks : public ::testing::Test {
     Save(model, folder_ / "input");
   }
 
-  KrotResult Solve(const std::vector<std::string>& more) const {
-    std::vector<std::string> arguments = {
-        "solver",           "--input_path",  folder_ / "input", "--output_path",
-        folder_ / "output", "--report_path", folder_ / "r.json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+  KrotResult Solve(const Words& more) const {
+    return RunKrot(
+        {"solver", "--input_path", folder_ / "input", "--output_path",
+         folder_ / "output", "--report_path", folder_ / "r.json"},
+        more);
   }
-  Json Report() const { return Json::parse(ReadBytes(folder_ / "r.json")); }
+  Json Report() const { return ReadJson(folder_ / "r.json"); }
 
   TempFolder folder_;
 };
 
 TEST_F(RawTracks, AreSolvedWithinTheBoundWithAProofOfWhatWasLeftOut) {
   const KrotResult result =
-      Solve({"--Solver.init", "feasible", "--Solver.max_error", "3",
-             "--conflicts_path", folder_ / "c.json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+      Succeeded(Solve({"--Solver.init", "feasible", "--Solver.max_error", "3",
+                       "--conflicts_path", folder_ / "c.json"}));
   const Json outliers = Report()["outliers"];
   const int removed = outliers["num_removed"];
   const int must_go = outliers["num_must_go"];
@@ -56,15 +50,12 @@ TEST_F(RawTracks, AreSolvedWithinTheBoundWithAProofOfWhatWasLeftOut) {
   for (const double error : PixelErrors(Load(folder_ / "output"))) {
     EXPECT_LE(error, 3 * (1 + 1e-9));
   }
-  const KrotResult check =
-      RunKrot({"certificate_checker", "--input_path", folder_ / "input",
-               "--certificate_path", folder_ / "c.json"});
-  EXPECT_EQ(check.exit_code, 0) << check.err;
+  Succeeded(RunKrot({"certificate_checker", "--input_path", folder_ / "input",
+                     "--certificate_path", folder_ / "c.json"}));
 }
 
 TEST_F(RawTracks, AreSolvedWithABoundThatNoiseChoosesAndThatIsSaid) {
-  const KrotResult result = Solve({"--Solver.init", "feasible"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(Solve({"--Solver.init", "feasible"}));
   EXPECT_THAT(result.err, HasSubstr("leaving out what noise of "));
   const Json report = Report();
   // Some five times the scene's noise, which a bound by hand does not beat.
@@ -75,18 +66,16 @@ TEST_F(RawTracks, AreSolvedWithABoundThatNoiseChoosesAndThatIsSaid) {
 }
 
 TEST_F(RawTracks, AreNotSearchedForALowestMaximumThatNobodyAskedFor) {
-  const std::vector<std::string> bound = {"--Solver.init", "feasible",
-                                          "--Solver.max_error", "3"};
-  ASSERT_EQ(Solve(bound).exit_code, 0);
+  const Words bound = {"--Solver.init", "feasible", "--Solver.max_error", "3"};
+  Succeeded(Solve(bound));
   const Json without = Report();
   EXPECT_EQ(without["termination"], "within_bound");
   EXPECT_TRUE(without["lower_bound"].is_null());
   EXPECT_TRUE(without["rounds"].empty());
   EXPECT_LE(without["cost_final"], 3);
-  std::vector<std::string> more = bound;
-  more.insert(more.end(), {"--certificate_path", folder_ / "certificate.json",
-                           "--overwrite", "1"});
-  ASSERT_EQ(Solve(more).exit_code, 0);
+  Succeeded(
+      Solve(bound + Words{"--certificate_path", folder_ / "certificate.json",
+                          "--overwrite", "1"}));
   const Json with = Report();
   EXPECT_EQ(with["certified"], true);
   // Both end with the least squares below the same cap.
@@ -96,9 +85,7 @@ TEST_F(RawTracks, AreNotSearchedForALowestMaximumThatNobodyAskedFor) {
 
 TEST_F(RawTracks, KeepABoundThatIsGivenWhereTheModelHasPositions) {
   Save(SmallLegacyModel(), folder_ / "input");
-  const KrotResult result =
-      Solve({"--Solver.init", "feasible", "--Solver.max_error", "3"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(Solve({"--Solver.init", "feasible", "--Solver.max_error", "3"}));
   EXPECT_EQ(Report()["outliers"]["max_error"], 3);
 }
 
@@ -127,7 +114,7 @@ TEST(WeaklyTiedTracks, AreSaidNotToHoldTheScaleOfAPart) {
   EXPECT_EQ(result.exit_code, 10) << result.err;
   EXPECT_THAT(result.err, HasSubstr("10 images ("));
   EXPECT_THAT(result.err, HasSubstr("hang on the rest by 10 tracks"));
-  const Json report = Json::parse(ReadBytes(folder / "r.json"));
+  const Json report = ReadJson(folder / "r.json");
   const Json& parts = report["outliers"]["weak_parts"];
   ASSERT_EQ(parts.size(), 1u);
   EXPECT_EQ(parts[0]["num_tracks"], 10);
@@ -174,13 +161,12 @@ TEST(SameImageOption, LeavesOneOfAnImageInATrackAndNamesTracksInTheSupport) {
   options.duplicate_ratio = 0.2;
   Save(SynthesizeScene(options).model, folder / "input");
   const auto solve = [&](const std::string& same_image) {
-    const KrotResult result =
+    const KrotResult result = Succeeded(
         RunKrot({"solver", "--input_path", folder / "input", "--output_path",
                  folder / "output", "--overwrite", "1", "--report_path",
-                 folder / "r.json", "--Problem.same_image", same_image});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+                 folder / "r.json", "--Problem.same_image", same_image}));
     EXPECT_THAT(result.out, HasSubstr("with an image more than once"));
-    return Json::parse(ReadBytes(folder / "r.json"));
+    return ReadJson(folder / "r.json");
   };
   const Json keep = solve("keep");
   const Json closest = solve("closest");
@@ -200,14 +186,13 @@ TEST(SameImageOption, GivesAModelWhereverTheTwinsEnd) {
   options.duplicate_ratio = 0.5;
   Save(SynthesizeScene(options).ground_truth, folder / "input");
   for (const char* command : {"solver", "point_triangulator"}) {
-    const KrotResult result =
+    const KrotResult result = Succeeded(
         RunKrot({command, "--input_path", folder / "input", "--output_path",
                  folder / command, "--report_path", folder / command / "r.json",
-                 "--Problem.same_image", "closest"});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+                 "--Problem.same_image", "closest"}));
     EXPECT_THAT(result.out, HasSubstr("are taken to be wrong: left out, still "
                                       "in the model"));
-    const Json report = Json::parse(ReadBytes(folder / command / "r.json"));
+    const Json report = ReadJson(folder / command / "r.json");
     EXPECT_EQ(report["is_given_back"], false);
     EXPECT_LT(report["pixel_error"]["after"]["max"],
               report["pixel_error"]["before"]["max"]);

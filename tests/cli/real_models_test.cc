@@ -6,7 +6,6 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "krot/model.h"
 #include "krot/model/rigs.h"
@@ -60,7 +59,7 @@ std::string NameOf(const ::testing::TestParamInfo<RealModel>& test) {
   return test.param.folder;
 }
 
-void ExpectCertifiedOptimum(const nlohmann::json& report, double optimum_px) {
+void ExpectCertifiedOptimum(const Json& report, double optimum_px) {
   EXPECT_EQ(report["certified"], true);
   EXPECT_EQ(report["termination"], "gap_reached");
   const double lowest_px = report["finish"]["lowest_cost"];
@@ -79,11 +78,9 @@ class SolverOnRealModel : public ::testing::TestWithParam<RealModel> {
   void SetUp() override {
     if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
     input_ = *RealModels() / GetParam().folder;
-    const KrotResult result =
-        RunKrot({"solver", "--input_path", input_, "--output_path", output_,
-                 "--report_path", folder_ / "report.json", "--certificate_path",
-                 folder_ / "certificate.json"});
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+    Succeeded(RunKrot({"solver", "--input_path", input_, "--output_path",
+                       output_, "--report_path", folder_ / "report.json",
+                       "--certificate_path", folder_ / "certificate.json"}));
     before_ = Load(input_);
     after_ = Load(output_);
   }
@@ -92,7 +89,7 @@ class SolverOnRealModel : public ::testing::TestWithParam<RealModel> {
   void ExpectColmapReadsConvertsAndAdjusts();
   void ExpectColmapComputesTheStoredErrors();
 
-  bool Colmap(const std::vector<std::string>& arguments) {
+  bool Colmap(const Words& arguments) {
     return RunColmap(arguments, folder_ / "colmap.log");
   }
 
@@ -112,13 +109,11 @@ TEST_P(SolverOnRealModel, ReachesTheCertifiedOptimumAndPleasesColmap) {
 }
 
 void SolverOnRealModel::ExpectLowerCostAndSameContents() {
-  const auto report = nlohmann::json::parse(ReadBytes(folder_ / "report.json"));
+  const auto report = ReadJson(folder_ / "report.json");
   EXPECT_LE(report["cost_final"], report["cost_initial"]);
   ExpectCertifiedOptimum(report, GetParam().optimum_px);
-  EXPECT_EQ(RunKrot({"certificate_checker", "--input_path", output_,
-                     "--certificate_path", folder_ / "certificate.json"})
-                .exit_code,
-            0);
+  Succeeded(RunKrot({"certificate_checker", "--input_path", output_,
+                     "--certificate_path", folder_ / "certificate.json"}));
   EXPECT_THAT(after_, IsModel(before_, Ignoring{true, true, true}));
 
   const CentreStatistics before = Centres(before_);
@@ -133,7 +128,7 @@ void SolverOnRealModel::ExpectColmapReadsConvertsAndAdjusts() {
   std::istringstream figures(ReadBytes(folder_ / "colmap.log"));
   const std::string ours = RunKrot({"model_analyzer", "--path", output_}).out;
   for (std::string figure; std::getline(figures, figure);) {
-    EXPECT_THAT(ours, ::testing::HasSubstr(figure + "\n"));
+    EXPECT_THAT(ours, HasSubstr(figure + "\n"));
   }
   for (const char* name : {"text", "binary", "adjusted"}) {
     fs::create_directory(folder_ / name);
@@ -185,22 +180,14 @@ class StartOnRealModel : public ::testing::TestWithParam<RealModel> {
     if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
   }
 
-  void ExpectOptimumFrom(const Model& start,
-                         const std::vector<std::string>& more) {
+  void ExpectOptimumFrom(const Model& start, const Words& more) {
     TempFolder folder;
     Save(start, folder / "start");
-    std::vector<std::string> arguments = {"solver",
-                                          "--input_path",
-                                          folder / "start",
-                                          "--output_path",
-                                          folder / "output",
-                                          "--report_path",
-                                          folder / "report.json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const KrotResult result = RunKrot(arguments);
-    ASSERT_EQ(result.exit_code, 0) << result.err;
-    const auto report =
-        nlohmann::json::parse(ReadBytes(folder / "report.json"));
+    Succeeded(
+        RunKrot({"solver", "--input_path", folder / "start", "--output_path",
+                 folder / "output", "--report_path", folder / "report.json"},
+                more));
+    const auto report = ReadJson(folder / "report.json");
     ExpectCertifiedOptimum(report, GetParam().optimum_px);
     EXPECT_EQ(report["num_observations"], start.track_elements.size());
   }
@@ -232,13 +219,11 @@ INSTANTIATE_TEST_SUITE_P(Local, StartOnRealModel,
 TEST(SolverOnOnePoint, SaysThatAllErrorsAreZero) {
   if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
   TempFolder folder;
-  const KrotResult result =
+  const KrotResult result = Succeeded(
       RunKrot({"solver", "--input_path", *RealModels() / "edge_one_point",
-               "--output_path", folder / "output"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, ::testing::HasSubstr("nothing left to lower"));
-  EXPECT_THAT(result.out,
-              ::testing::HasSubstr("Every error is zero up to rounding"));
+               "--output_path", folder / "output"}));
+  EXPECT_THAT(result.out, HasSubstr("nothing left to lower"));
+  EXPECT_THAT(result.out, HasSubstr("Every error is zero up to rounding"));
 }
 
 class SettingsOnRealModel : public ::testing::TestWithParam<const char*> {};
@@ -247,13 +232,11 @@ TEST_P(SettingsOnRealModel, FastOnesEndNoHigherThanThePapers) {
   if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
   TempFolder folder;
   const auto final_cost = [&](const std::string& settings) -> double {
-    const KrotResult result = RunKrot(
-        {"solver", "--input_path", *RealModels() / GetParam(), "--output_path",
-         folder / settings, "--report_path", folder / settings / "report.json",
-         "--Solver.method", "res_int", "--Solver.settings", settings});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    return nlohmann::json::parse(
-        ReadBytes(folder / settings / "report.json"))["cost_final"];
+    Succeeded(RunKrot({"solver", "--input_path", *RealModels() / GetParam(),
+                       "--output_path", folder / settings, "--report_path",
+                       folder / settings / "report.json", "--Solver.method",
+                       "res_int", "--Solver.settings", settings}));
+    return ReadJson(folder / settings / "report.json")["cost_final"];
   };
   EXPECT_LE(final_cost("fast"), final_cost("paper"));
 }

@@ -34,14 +34,12 @@ SceneOptions ThreeSensors() {
 class Rigs : public Known {
  protected:
   // Runs a command on a model and checks what has to hold of every result.
-  Model Run(const Model& model, std::vector<std::string> command) {
+  Model Run(const Model& model, const Words& command) {
     ValidateModel(model);
     Save(model, folder_ / "input");
-    command.insert(command.end(),
-                   {"--input_path", folder_ / "input", "--output_path",
-                    folder_ / "output", "--overwrite", "1"});
-    const KrotResult result = RunKrot(command);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+    Succeeded(
+        RunKrot(command, {"--input_path", folder_ / "input", "--output_path",
+                          folder_ / "output", "--overwrite", "1"}));
     return CheckedOutput(model);
   }
 
@@ -49,12 +47,9 @@ class Rigs : public Known {
   Json Solve(const Model& model) {
     ValidateModel(model);
     Save(model, folder_ / "input");
-    const KrotResult result =
-        Known::Solve("input", "output", {"--overwrite", "1"});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+    Succeeded(Known::Solve("input", "output", {"--overwrite", "1"}));
     CheckedOutput(model);
-    const KrotResult check = Check("output", "output");
-    EXPECT_EQ(check.exit_code, 0) << check.err;
+    Succeeded(Check("output", "output"));
     const Json report = Report("output");
     EXPECT_EQ(report["termination"], "gap_reached");
     return report;
@@ -143,8 +138,7 @@ const RigidTransform kLever{
 
 TEST_F(Rigs, StayToTheBitThroughEveryCommand) {
   const Model model = SynthesizeScene(ThreeSensors()).model;
-  for (const std::vector<std::string>& command :
-       std::vector<std::vector<std::string>>{
+  for (const Words& command : std::vector<Words>{
            {"solver"},
            {"solver", "--Solver.method", "res_int"},
            {"solver", "--Solver.init", "feasible"},
@@ -173,12 +167,11 @@ TEST_F(Rigs, WhoseImagesStandElsewhereAreWarnedOf) {
   Save(model, folder_ / "stale");
   EXPECT_EQ(RunKrot({"model_analyzer", "--path", folder_ / "sound"}).err, "");
   const KrotResult result =
-      RunKrot({"model_analyzer", "--path", folder_ / "stale"});
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.err, ::testing::HasSubstr(
-                              "the poses of 5 of 24 images are not those that "
-                              "rigs and frames give them, rotations are off by "
-                              "11.46 degrees in the median and 11.46 at most"));
+      Succeeded(RunKrot({"model_analyzer", "--path", folder_ / "stale"}));
+  EXPECT_THAT(result.err,
+              HasSubstr("the poses of 5 of 24 images are not those that "
+                        "rigs and frames give them, rotations are off by "
+                        "11.46 degrees in the median and 11.46 at most"));
 }
 
 TEST_F(Rigs, OfAnImuHaveTheOptimumOfTheSameRigOfACamera) {

@@ -3,7 +3,6 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
@@ -31,13 +30,13 @@ TEST_F(Scarcity, OfMemoryEndsWithASentence) {
   SceneOptions options = SmallScene();
   options.num_points = 200000;
   Save(SynthesizeScene(options).model, folder_ / "input");
-  const KrotResult result =
-      RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
-               folder_ / "output", "--log_level", "0"},
-              100 * kMegabyte);
-  EXPECT_EQ(result.exit_code, 6);
-  EXPECT_THAT(result.err, IsOneSentence("krot solver", "out of memory"));
-  EXPECT_EQ(FileNames(folder_.path()), std::vector<std::string>{"input"});
+  EXPECT_THAT(
+      KrotProcess({"solver", "--input_path", folder_ / "input", "--output_path",
+                   folder_ / "output", "--log_level", "0"},
+                  100 * kMegabyte)
+          .Wait(),
+      IsRefused(6, "krot solver", "out of memory"));
+  EXPECT_EQ(FileNames(folder_.path()), Words{"input"});
 }
 
 TEST_F(Scarcity, OfWhatASolveNeedsIsSeenBeforeItBegins) {
@@ -45,15 +44,15 @@ TEST_F(Scarcity, OfWhatASolveNeedsIsSeenBeforeItBegins) {
   options.num_points = 60000;
   Save(SynthesizeScene(options).model, folder_ / "input");
   const KrotResult result =
-      RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
-               folder_ / "output", "--Solver.init", "feasible",
-               "--Solver.method", "joint"},
-              150 * kMegabyte);
+      KrotProcess({"solver", "--input_path", folder_ / "input", "--output_path",
+                   folder_ / "output", "--Solver.init", "feasible",
+                   "--Solver.method", "joint"},
+                  150 * kMegabyte)
+          .Wait();
   EXPECT_EQ(result.exit_code, 6);
-  EXPECT_THAT(result.err,
-              ::testing::HasSubstr("out of memory before it began"));
-  EXPECT_THAT(result.err, ::testing::HasSubstr(" are free"));
-  EXPECT_EQ(FileNames(folder_.path()), std::vector<std::string>{"input"});
+  EXPECT_THAT(result.err, HasSubstr("out of memory before it began"));
+  EXPECT_THAT(result.err, HasSubstr(" are free"));
+  EXPECT_EQ(FileNames(folder_.path()), Words{"input"});
 }
 
 TEST_F(Scarcity, OfThreadsChangesNothing) {
@@ -62,12 +61,12 @@ TEST_F(Scarcity, OfThreadsChangesNothing) {
   Save(SynthesizeScene(options).model, folder_ / "input");
   const auto solve = [&](const std::string& output, const std::string& threads,
                          uint64_t max_memory_bytes) {
-    const KrotResult result =
-        RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
-                 folder_ / output, "--ResInt.max_sweeps", "2",
-                 "--Solver.num_threads", threads},
-                max_memory_bytes);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+    Succeeded(
+        KrotProcess({"solver", "--input_path", folder_ / "input",
+                     "--output_path", folder_ / output, "--ResInt.max_sweeps",
+                     "2", "--Solver.num_threads", threads},
+                    max_memory_bytes)
+            .Wait());
     return ReadBytes(folder_ / output / "points3D.bin");
   };
   // The stacks alone of 1000 threads would take 8 GB.
@@ -93,13 +92,11 @@ TEST_F(Scarcity, IsAnnouncedToThirtyPercent) {
   Save(SynthesizeScene(options).model, folder_ / "input");
   for (const char* method : {"auto", "joint", "res_int"}) {
     SCOPED_TRACE(method);
-    const KrotResult result =
+    const KrotResult result = Succeeded(
         RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
                  folder_ / "output", "--overwrite", "1", "--report_path",
-                 folder_ / "report.json", "--Solver.method", method});
-    ASSERT_EQ(result.exit_code, 0) << result.err;
-    const double peak = nlohmann::json::parse(
-        ReadBytes(folder_ / "report.json"))["peak_memory_bytes"];
+                 folder_ / "report.json", "--Solver.method", method}));
+    const double peak = ReadJson(folder_ / "report.json")["peak_memory_bytes"];
     EXPECT_NEAR(AnnouncedBytes(result.err), peak, 0.3 * peak);
   }
 }

@@ -13,10 +13,9 @@
 namespace krot::internal {
 
 SceneOptions SmallScene() {
-  SceneOptions options = SceneOf(6, 60, 4, 0.5);
+  SceneOptions options = SceneOf(6, 60, 4, 0.5, 3);
   options.start_translation_noise = 0.003;
   options.start_point_noise = 0.003;
-  options.random_seed = 3;
   return options;
 }
 

@@ -5,7 +5,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "krot/model.h"
 #include "krot/model/rigs.h"
@@ -18,31 +17,21 @@
 namespace krot::internal {
 namespace {
 
-using Json = nlohmann::json;
-
-std::vector<std::string> Keys(const Json& json) {
-  std::vector<std::string> keys;
+Words Keys(const Json& json) {
+  Words keys;
   for (const auto& item : json.items()) keys.push_back(item.key());
   return keys;
 }
 
 class Commands : public ::testing::Test {
  protected:
-  KrotResult Run(const std::string& command,
-                 std::vector<std::string> more = {}) const {
-    std::vector<std::string> arguments = {command,
-                                          "--input_path",
-                                          folder_ / "input",
-                                          "--output_path",
-                                          folder_ / "output",
-                                          "--report_path",
-                                          folder_ / "report.json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+  KrotResult Run(const std::string& command, Words more = {}) const {
+    return RunKrot(
+        {command, "--input_path", folder_ / "input", "--output_path",
+         folder_ / "output", "--report_path", folder_ / "report.json"},
+        more);
   }
-  Json Report() const {
-    return Json::parse(ReadBytes(folder_ / "report.json"));
-  }
+  Json Report() const { return ReadJson(folder_ / "report.json"); }
 
   TempFolder folder_;
 };
@@ -55,8 +44,7 @@ TEST_F(Commands, SolverLowersTheCostAndKeepsEverythingElse) {
     options.sensors_per_rig = sensors_per_rig;
     const Model before = SynthesizeScene(options).model;
     Save(before, folder_ / "input");
-    const KrotResult result = Run("solver", {"--overwrite", "1"});
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+    Succeeded(Run("solver", {"--overwrite", "1"}));
 
     const Model after = Load(folder_ / "output");
     EXPECT_THAT(after, IsModel(before, kWhatASolveChanges));
@@ -72,7 +60,7 @@ TEST_F(Commands, SolverLowersTheCostAndKeepsEverythingElse) {
 
 TEST_F(Commands, SolverStoresTheMeanPixelErrorOfEveryPoint) {
   Save(SmallLegacyModel(), folder_ / "input");
-  ASSERT_EQ(Run("solver").exit_code, 0);
+  Succeeded(Run("solver"));
   const Model after = Load(folder_ / "output");
   const std::vector<double> errors_px = PixelErrors(after);
   for (const Point3D& point : after.points3D) {
@@ -91,13 +79,11 @@ TEST_F(Commands, SolverGivesTheSameBytesAtAnyNumberOfThreads) {
   options.num_points = 2000;
   Save(SynthesizeScene(options).model, folder_ / "input");
   for (const char* method : {"auto", "res_int"}) {
-    std::vector<std::string> images;
-    std::vector<std::string> points;
+    Words images;
+    Words points;
     for (const char* threads : {"1", "2", "3", "-1"}) {
-      ASSERT_EQ(Run("solver", {"--Solver.num_threads", threads, "--overwrite",
-                               "1", "--Solver.method", method})
-                    .exit_code,
-                0);
+      Succeeded(Run("solver", {"--Solver.num_threads", threads, "--overwrite",
+                               "1", "--Solver.method", method}));
       images.push_back(ReadBytes(folder_ / "output/images.bin"));
       points.push_back(ReadBytes(folder_ / "output/points3D.bin"));
     }
@@ -108,10 +94,8 @@ TEST_F(Commands, SolverGivesTheSameBytesAtAnyNumberOfThreads) {
 
 TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
   Save(SmallLegacyModel(), folder_ / "input");
-  ASSERT_EQ(Run("solver", {"--random_seed", "7", "--Solver.num_threads", "2",
-                           "--Solver.norm", "inf"})
-                .exit_code,
-            0);
+  Succeeded(Run("solver", {"--random_seed", "7", "--Solver.num_threads", "2",
+                           "--Solver.norm", "inf"}));
   const Json report = Report();
   EXPECT_THAT(
       Keys(report),
@@ -131,20 +115,16 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
                   "finish", "loss", "termination", "cap", "lowest_cost",
                   "cost_initial", "cost_final", "duality_gap", "stationarity",
                   "num_active", "num_iterations", "seconds"));
-  EXPECT_EQ(
-      Keys(report["left_out"]),
-      (std::vector<std::string>{"behind", "fixed", "no_pose", "same_image",
-                                "short_track", "undistortion"}));
-  EXPECT_EQ(Keys(report["pixel_error"]),
-            (std::vector<std::string>{"after", "before"}));
+  EXPECT_EQ(Keys(report["left_out"]),
+            (Words{"behind", "fixed", "no_pose", "same_image", "short_track",
+                   "undistortion"}));
+  EXPECT_EQ(Keys(report["pixel_error"]), (Words{"after", "before"}));
   EXPECT_EQ(Keys(report["pixel_error"]["after"]),
-            (std::vector<std::string>{"max", "mean", "p99", "rms"}));
+            (Words{"max", "mean", "p99", "rms"}));
   EXPECT_EQ(Keys(report["seconds"]),
-            (std::vector<std::string>{"build", "certify", "read", "solve",
-                                      "total", "write"}));
+            (Words{"build", "certify", "read", "solve", "total", "write"}));
   ASSERT_FALSE(report["sweeps"].empty());
-  EXPECT_EQ(Keys(report["sweeps"][0]),
-            (std::vector<std::string>{"cost", "seconds"}));
+  EXPECT_EQ(Keys(report["sweeps"][0]), (Words{"cost", "seconds"}));
   EXPECT_EQ(report["version"], KROT_VERSION);
   EXPECT_EQ(report["command"], "solver");
   EXPECT_EQ(report["method"], "auto");
@@ -156,16 +136,15 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
              report["lower_bound"].get<double>()) /
                 report["cost_final"].get<double>());
   ASSERT_FALSE(report["iterations"].empty());
-  EXPECT_EQ(Keys(report["iterations"][0]),
-            (std::vector<std::string>{"cost", "gap", "lower_bound", "method",
-                                      "seconds", "target"}));
+  EXPECT_EQ(
+      Keys(report["iterations"][0]),
+      (Words{"cost", "gap", "lower_bound", "method", "seconds", "target"}));
   EXPECT_GT(report["working_observations"], 0);
   EXPECT_LE(report["working_observations"], report["num_observations"]);
   ASSERT_FALSE(report["support"].empty());
-  EXPECT_EQ(
-      Keys(report["support"][0]),
-      (std::vector<std::string>{"error_px", "image_id", "image_name",
-                                "multiplier", "point2D_idx", "point3D_id"}));
+  EXPECT_EQ(Keys(report["support"][0]),
+            (Words{"error_px", "image_id", "image_name", "multiplier",
+                   "point2D_idx", "point3D_id"}));
   EXPECT_EQ(report["num_images"], 6);
   EXPECT_EQ(report["num_points"], 60);
   EXPECT_EQ(report["threads"], 2);
@@ -175,7 +154,7 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
 
 TEST_F(Commands, SolverSaysNullForWhatSweepsAloneDoNotKnow) {
   Save(SmallLegacyModel(), folder_ / "input");
-  ASSERT_EQ(Run("solver", {"--Solver.method", "res_int"}).exit_code, 0);
+  Succeeded(Run("solver", {"--Solver.method", "res_int"}));
   const Json report = Report();
   EXPECT_EQ(report["method"], "res_int");
   EXPECT_EQ(report["termination"], "stalled");
@@ -190,50 +169,45 @@ TEST_F(Commands, SolverSaysNullForWhatSweepsAloneDoNotKnow) {
 TEST_F(Commands, SolverWritesACertificateThatCheckerAndAnalyzerAccept) {
   Save(SmallLegacyModel(), folder_ / "input");
   const std::string certificate = folder_ / "certificate.json";
-  const KrotResult solve = Run("solver", {"--certificate_path", certificate});
-  ASSERT_EQ(solve.exit_code, 0) << solve.err;
-  EXPECT_THAT(solve.out, ::testing::HasSubstr(", proved to be within "));
+  const KrotResult solve =
+      Succeeded(Run("solver", {"--certificate_path", certificate}));
+  EXPECT_THAT(solve.out, HasSubstr(", proved to be within "));
   // Of the model that was read as well as of the one that was written.
   for (const char* model : {"input", "output"}) {
-    const KrotResult check =
+    const KrotResult check = Succeeded(
         RunKrot({"certificate_checker", "--input_path", folder_ / model,
                  "--certificate_path", certificate, "--num_worst", "1",
-                 "--report_path", folder_ / "check.json"});
-    EXPECT_EQ(check.exit_code, 0) << check.err;
-    const Json report = Json::parse(ReadBytes(folder_ / "check.json"));
+                 "--report_path", folder_ / "check.json"}));
+    const Json report = ReadJson(folder_ / "check.json");
     EXPECT_EQ(report["command"], "certificate_checker");
     EXPECT_GT(report["certificate"]["lower_bound"], 0);
     EXPECT_LE(report["certificate"]["lower_bound"],
               report["certificate"]["cost"]);
     EXPECT_TRUE(report["conflicts"].is_null());
-    EXPECT_THAT(check.out, ::testing::HasSubstr("worst first; the first 1\n"));
+    EXPECT_THAT(check.out, HasSubstr("worst first; the first 1\n"));
   }
   const KrotResult analysis =
-      RunKrot({"model_analyzer", "--path", folder_ / "output",
-               "--certificate_path", certificate});
-  EXPECT_EQ(analysis.exit_code, 0) << analysis.err;
-  EXPECT_THAT(analysis.out, ::testing::HasSubstr("\nPoints: 60\n"));
-  EXPECT_THAT(analysis.out, ::testing::HasSubstr("The certificate holds"));
-  EXPECT_THAT(analysis.out, ::testing::HasSubstr("worst first"));
+      Succeeded(RunKrot({"model_analyzer", "--path", folder_ / "output",
+                         "--certificate_path", certificate}));
+  EXPECT_THAT(analysis.out, HasSubstr("\nPoints: 60\n"));
+  EXPECT_THAT(analysis.out, HasSubstr("The certificate holds"));
+  EXPECT_THAT(analysis.out, HasSubstr("worst first"));
 
   Save(SynthesizeScene(SmallScene()).model, folder_ / "other");
-  const KrotResult other =
-      RunKrot({"model_analyzer", "--path", folder_ / "other",
-               "--certificate_path", certificate});
-  EXPECT_EQ(other.exit_code, 4);
-  EXPECT_THAT(other.err, IsOneSentence("krot model_analyzer", "refused"));
+  EXPECT_THAT(RunKrot({"model_analyzer", "--path", folder_ / "other",
+                       "--certificate_path", certificate}),
+              IsRefused(4, "krot model_analyzer", "refused"));
 }
 
 TEST_F(Commands, SolverWarnsOfAGapThatIsMissed) {
   Save(SmallLegacyModel(), folder_ / "input");
-  const KrotResult result =
+  const KrotResult result = Succeeded(
       Run("solver", {"--Joint.max_iterations", "2", "--certificate_path",
-                     folder_ / "certificate.json"});
-  EXPECT_EQ(result.exit_code, 0);
+                     folder_ / "certificate.json"}));
   EXPECT_THAT(result.err,
-              ::testing::HasSubstr("warning: the gap asked for is not reached: "
-                                   "Joint.max_iterations was hit"));
-  EXPECT_THAT(result.err, ::testing::HasSubstr("is not written"));
+              HasSubstr("warning: the gap asked for is not reached: "
+                        "Joint.max_iterations was hit"));
+  EXPECT_THAT(result.err, HasSubstr("is not written"));
   EXPECT_EQ(Report()["termination"], "max_iterations");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "certificate.json"));
 }
@@ -244,12 +218,11 @@ TEST_F(Commands, SolverWarnsOfErrorsOfZeroThatSayNothing) {
   options.num_points = 2;
   options.track_length = 2;
   Save(SynthesizeScene(options).model, folder_ / "input");
-  const KrotResult result = Run("solver");
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.err, ::testing::HasSubstr(
-                              "warning: errors of zero say nothing: 4 "
-                              "observations are too few to determine 2 frames "
-                              "and 2 points"));
+  const KrotResult result = Succeeded(Run("solver"));
+  EXPECT_THAT(result.err,
+              HasSubstr("warning: errors of zero say nothing: 4 "
+                        "observations are too few to determine 2 frames "
+                        "and 2 points"));
   EXPECT_EQ(Report()["is_underdetermined"], true);
 }
 
@@ -259,14 +232,12 @@ TEST_F(Commands, SolverNeedsNoTranslations) {
     options.has_rigs = has_rigs;
     const Model model = SynthesizeScene(options).model;
     Save(model, folder_ / "input");
-    ASSERT_EQ(Run("solver", {"--overwrite", "1"}).exit_code, 0);
+    Succeeded(Run("solver", {"--overwrite", "1"}));
     const double cost = Report()["cost_final"];
     Save(WithoutTranslations(model), folder_ / "input");
     for (const char* init : {"model", "feasible"}) {
-      const KrotResult result =
-          Run("solver", {"--Solver.init", init, "--overwrite", "1",
-                         "--certificate_path", folder_ / "proof.json"});
-      ASSERT_EQ(result.exit_code, 0) << result.err;
+      Succeeded(Run("solver", {"--Solver.init", init, "--overwrite", "1",
+                               "--certificate_path", folder_ / "proof.json"}));
       EXPECT_EQ(Report()["certified"], true);
       EXPECT_EQ(Report()["num_observations"], model.track_elements.size());
       EXPECT_NEAR(Report()["cost_final"], cost, 2e-4 * cost);
@@ -278,41 +249,35 @@ TEST_F(Commands, SolverNeedsNoTranslations) {
 TEST_F(Commands, SolverFromNothingTakesItsBoundFromTheNoise) {
   const Model model = SynthesizeScene(SmallScene()).model;
   Save(WithoutTranslations(model), folder_ / "input");
-  const KrotResult lowest = Run("solver", {"--overwrite", "1"});
-  ASSERT_EQ(lowest.exit_code, 0) << lowest.err;
+  Succeeded(Run("solver", {"--overwrite", "1"}));
   const double cost = Report()["cost_final"];
-  const KrotResult within =
-      Run("solver", {"--Solver.init", "feasible", "--overwrite", "1"});
-  ASSERT_EQ(within.exit_code, 0) << within.err;
+  const KrotResult within = Succeeded(
+      Run("solver", {"--Solver.init", "feasible", "--overwrite", "1"}));
   EXPECT_EQ(Report()["termination"], "within_bound");
   EXPECT_EQ(Report()["num_observations"], model.track_elements.size());
   EXPECT_GT(Report()["cost_final"], cost);
-  EXPECT_THAT(within.out, ::testing::HasSubstr("removed 0 of"));
+  EXPECT_THAT(within.out, HasSubstr("removed 0 of"));
 }
 
 TEST_F(Commands, SolverProvesThatNoStartIsBelowABound) {
   Save(SmallLegacyModel(), folder_ / "input");
   const std::string certificate = folder_ / "certificate.json";
-  const KrotResult result = Run(
-      "solver", {"--Solver.init", "feasible", "--Problem.init_max_error", "0.1",
-                 "--certificate_path", certificate, "--log_level", "0"});
-  EXPECT_EQ(result.exit_code, 7);
-  EXPECT_THAT(result.err,
-              IsOneSentence("krot solver",
-                            "infeasible: the largest error of every estimate "
-                            "is proved to be at least "));
-  EXPECT_EQ(FileNames(folder_.path()),
-            (std::vector<std::string>{"certificate.json", "input"}));
-  EXPECT_EQ(RunKrot({"certificate_checker", "--input_path", folder_ / "input",
-                     "--certificate_path", certificate})
-                .exit_code,
-            0);
+  EXPECT_THAT(
+      Run("solver",
+          {"--Solver.init", "feasible", "--Problem.init_max_error", "0.1",
+           "--certificate_path", certificate, "--log_level", "0"}),
+      IsRefused(7, "krot solver",
+                "infeasible: the largest error of every estimate "
+                "is proved to be at least "));
+  EXPECT_EQ(FileNames(folder_.path()), (Words{"certificate.json", "input"}));
+  Succeeded(RunKrot({"certificate_checker", "--input_path", folder_ / "input",
+                     "--certificate_path", certificate}));
 }
 
 TEST_F(Commands, SolverCountsWhatItLeavesOut) {
   Model model = SmallLegacyModel();
   Save(model, folder_ / "input");
-  ASSERT_EQ(Run("solver", {"--Problem.min_track_length", "4"}).exit_code, 0);
+  Succeeded(Run("solver", {"--Problem.min_track_length", "4"}));
   int64_t num_short = 0;
   for (const Point3D& point : model.points3D) {
     const uint64_t length = point.track_end - point.track_begin;
@@ -328,9 +293,7 @@ TEST_F(Commands, SolverMeasuresItsCostInTheNormAskedFor) {
   Save(SmallLegacyModel(), folder_ / "input");
   std::vector<double> costs;
   for (const char* norm : {"1", "1.5", "2", "inf"}) {
-    ASSERT_EQ(
-        Run("solver", {"--overwrite", "1", "--Solver.norm", norm}).exit_code,
-        0);
+    Succeeded(Run("solver", {"--overwrite", "1", "--Solver.norm", norm}));
     EXPECT_EQ(Report()["norm"], norm);
     EXPECT_LT(Report()["cost_final"], Report()["cost_initial"]);
     costs.push_back(Report()["cost_initial"]);
@@ -340,7 +303,7 @@ TEST_F(Commands, SolverMeasuresItsCostInTheNormAskedFor) {
 
 TEST_F(Commands, SolverStopsWhereThePaperDoesWithItsSettings) {
   Save(SmallLegacyModel(), folder_ / "input");
-  ASSERT_EQ(Run("solver", {"--Solver.settings", "paper"}).exit_code, 0);
+  Succeeded(Run("solver", {"--Solver.settings", "paper"}));
   const Json sweeps = Report()["sweeps"];
   ASSERT_GE(sweeps.size(), 2u);
   double last = Report()["cost_initial"];
@@ -353,11 +316,9 @@ TEST_F(Commands, SolverStopsWhereThePaperDoesWithItsSettings) {
 
 TEST_F(Commands, SolverRunsAsManySweepsAsAllowed) {
   Save(SmallLegacyModel(), folder_ / "input");
-  ASSERT_EQ(
+  Succeeded(
       Run("solver", {"--ResInt.max_sweeps", "2", "--ResInt.sweep_tolerance",
-                     "0", "--Solver.method", "res_int"})
-          .exit_code,
-      0);
+                     "0", "--Solver.method", "res_int"}));
   EXPECT_EQ(Report()["termination"], "max_sweeps");
   EXPECT_EQ(Report()["sweeps"].size(), 2u);
 }
@@ -365,8 +326,7 @@ TEST_F(Commands, SolverRunsAsManySweepsAsAllowed) {
 TEST_F(Commands, PointTriangulatorMovesPointsOnly) {
   const Model before = SmallLegacyModel();
   Save(before, folder_ / "input");
-  const KrotResult result = Run("point_triangulator");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(Run("point_triangulator"));
   Ignoring points_only;
   points_only.coordinates = true;
   points_only.point_errors = true;
@@ -380,12 +340,11 @@ TEST_F(Commands, PointTriangulatorMovesPointsOnly) {
 TEST_F(Commands, ModelAnalyzerListsTheWorstObservations) {
   const Model model = SmallLegacyModel();
   Save(model, folder_ / "input");
-  const KrotResult result =
+  const KrotResult result = Succeeded(
       RunKrot({"model_analyzer", "--path", folder_ / "input", "--num_worst",
-               "3", "--report_path", folder_ / "report.json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, ::testing::HasSubstr("\nPoints: 60\n"));
-  EXPECT_THAT(result.out, ::testing::HasSubstr("the 3 of 6 with the largest"));
+               "3", "--report_path", folder_ / "report.json"}));
+  EXPECT_THAT(result.out, HasSubstr("\nPoints: 60\n"));
+  EXPECT_THAT(result.out, HasSubstr("the 3 of 6 with the largest"));
   const Json report = Report();
   ASSERT_EQ(report["worst"].size(), 3u);
   EXPECT_EQ(report["worst"][0]["error_px"], Summarize(PixelErrors(model)).max);
@@ -413,10 +372,9 @@ TEST_F(Commands, ModelAnalyzerListsTheWorstOfManyCameras) {
   }
   UseTrivialRigs(&model);
   Save(model, folder_ / "input");
-  const KrotResult result =
+  const KrotResult result = Succeeded(
       RunKrot({"model_analyzer", "--path", folder_ / "input", "--report_path",
-               folder_ / "report.json", "--csv_path", folder_ / "errors.csv"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+               folder_ / "report.json", "--csv_path", folder_ / "errors.csv"}));
   const size_t begin = result.out.find("By camera, pixels; the 10 of 30 with");
   const size_t end = result.out.find("\nBy image");
   ASSERT_NE(begin, std::string::npos) << result.out;
@@ -446,7 +404,7 @@ TEST_F(Commands, ModelAnalyzerListsTheWorstOfManyCameras) {
   }
   for (const Json& expected : report["images"]) {
     ASSERT_TRUE(std::getline(csv, line));
-    EXPECT_THAT(line, ::testing::HasSubstr(expected["image_name"]));
+    EXPECT_THAT(line, HasSubstr(expected["image_name"]));
   }
   EXPECT_FALSE(std::getline(csv, line));
 }
@@ -454,15 +412,13 @@ TEST_F(Commands, ModelAnalyzerListsTheWorstOfManyCameras) {
 TEST_F(Commands, ModelAnalyzerTakesAModelWithoutPoints) {
   Save(WithShortTracks(SmallLegacyModel(), 0), folder_ / "input");
   const KrotResult result =
-      RunKrot({"model_analyzer", "--path", folder_ / "input"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, ::testing::HasSubstr("Points: 0\n"));
+      Succeeded(RunKrot({"model_analyzer", "--path", folder_ / "input"}));
+  EXPECT_THAT(result.out, HasSubstr("Points: 0\n"));
 }
 
 TEST_F(Commands, ModelSynthesizerMakesWhatItsOptionsSay) {
-  std::vector<std::string> arguments = {
-      "model_synthesizer", "--output_path", folder_ / "start",
-      "--ground_truth_path", folder_ / "truth"};
+  Words arguments = {"model_synthesizer", "--output_path", folder_ / "start",
+                     "--ground_truth_path", folder_ / "truth"};
   std::istringstream words(
       "--output_type TXT --overwrite 1 --random_seed 5 --Scene.layout street "
       "--Scene.num_frames 7 --Scene.num_points 90 --Scene.track_length 3 "
@@ -474,10 +430,9 @@ TEST_F(Commands, ModelSynthesizerMakesWhatItsOptionsSay) {
       "--Scene.start_translation_noise 0.01 --Scene.start_point_noise 0.02 "
       "--Scene.rotation_noise_deg 0.1");
   for (std::string word; words >> word;) arguments.push_back(word);
-  const KrotResult result = RunKrot(arguments);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(RunKrot(arguments));
 
-  SceneOptions options = SceneOf(7, 90, 3, 0.3);
+  SceneOptions options = SceneOf(7, 90, 3, 0.3, 5);
   options.layout = SceneLayout::kStreet;
   options.camera_model_id = 4;
   options.image_width = 800;
@@ -491,31 +446,25 @@ TEST_F(Commands, ModelSynthesizerMakesWhatItsOptionsSay) {
   options.start_translation_noise = 0.01;
   options.start_point_noise = 0.02;
   options.rotation_noise_deg = 0.1;
-  options.random_seed = 5;
   const SyntheticScene scene = SynthesizeScene(options);
   EXPECT_THAT(Load(folder_ / "start"), IsModel(scene.model));
   EXPECT_THAT(Load(folder_ / "truth"), IsModel(scene.ground_truth));
-  EXPECT_EQ(RunKrot(arguments).exit_code, 0);  // overwrites
+  Succeeded(RunKrot(arguments));  // overwrites
 }
 
 TEST_F(Commands, ModelSynthesizerWritesLegacyModels) {
-  ASSERT_EQ(RunKrot({"model_synthesizer", "--output_path", folder_ / "scene",
-                     "--Scene.has_rigs", "0"})
-                .exit_code,
-            0);
-  EXPECT_EQ(
-      FileNames(folder_ / "scene"),
-      (std::vector<std::string>{"cameras.bin", "images.bin", "points3D.bin"}));
+  Succeeded(RunKrot({"model_synthesizer", "--output_path", folder_ / "scene",
+                     "--Scene.has_rigs", "0"}));
+  EXPECT_EQ(FileNames(folder_ / "scene"),
+            (Words{"cameras.bin", "images.bin", "points3D.bin"}));
 }
 
 TEST_F(Commands, SolverHalvesTheCostAtLeastWhereObservationsAreExact) {
   SceneOptions options = SmallScene();
   options.pixel_noise = 0;
   Save(SynthesizeScene(options).model, folder_ / "input");
-  ASSERT_EQ(Run("solver", {"--Solver.method", "res_int",
-                           "--ResInt.sweep_tolerance", "1e-3"})
-                .exit_code,
-            0);
+  Succeeded(Run("solver", {"--Solver.method", "res_int",
+                           "--ResInt.sweep_tolerance", "1e-3"}));
   EXPECT_LT(Report()["cost_final"],
             0.5 * Report()["cost_initial"].get<double>());
 }

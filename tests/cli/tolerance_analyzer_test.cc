@@ -8,7 +8,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "krot/model.h"
 #include "tests/cli/krot_process.h"
@@ -16,9 +15,6 @@
 
 namespace krot::internal {
 namespace {
-
-using ::testing::HasSubstr;
-using Json = nlohmann::json;
 
 class ToleranceAnalyzer : public ::testing::Test {
  protected:
@@ -43,19 +39,14 @@ class ToleranceAnalyzer : public ::testing::Test {
     options.start_translation_noise = options.start_point_noise = 0;
     return options;
   }
-  KrotResult Analyze(const std::vector<std::string>& more,
+  KrotResult Analyze(const Words& more,
                      const std::string& input = "input") const {
-    std::vector<std::string> arguments = {"tolerance_analyzer",
-                                          "--input_path",
-                                          folder_ / input,
-                                          "--report_path",
-                                          folder_ / "r.json",
-                                          "--ToleranceAnalyzer.max_error",
-                                          max_error_};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return RunKrot(arguments);
+    return RunKrot(
+        {"tolerance_analyzer", "--input_path", folder_ / input, "--report_path",
+         folder_ / "r.json", "--ToleranceAnalyzer.max_error", max_error_},
+        more);
   }
-  Json Report() const { return Json::parse(ReadBytes(folder_ / "r.json")); }
+  Json Report() const { return ReadJson(folder_ / "r.json"); }
 
   TempFolder folder_;
   Model model_;
@@ -64,12 +55,11 @@ class ToleranceAnalyzer : public ::testing::Test {
 
 TEST_F(ToleranceAnalyzer, TellsTheSameInTableReportCsvAndPage) {
   const std::string point = std::to_string(model_.points3D[3].id);
-  const KrotResult result = Analyze(
+  const KrotResult result = Succeeded(Analyze(
       {"--csv_path", folder_ / "boxes.csv", "--html_path", folder_ / "p.html",
        "--ToleranceAnalyzer.images",
        model_.images[1].name + "," + std::to_string(model_.images[2].id),
-       "--ToleranceAnalyzer.points", point});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+       "--ToleranceAnalyzer.points", point}));
   EXPECT_THAT(result.out, HasSubstr(model_.images[1].name));
   EXPECT_THAT(result.out, HasSubstr("point " + point));
   const Json report = Report();
@@ -100,8 +90,7 @@ TEST_F(ToleranceAnalyzer, TellsTheSameInTableReportCsvAndPage) {
 }
 
 TEST_F(ToleranceAnalyzer, ListsTheWidestOfManyBoxes) {
-  const KrotResult result = Analyze({"--num_worst", "2"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(Analyze({"--num_worst", "2"}));
   EXPECT_THAT(result.out, HasSubstr("the 2 widest of 6, --csv_path has all"));
   const auto width = [](const Json& box) {
     double largest = 0;
@@ -132,9 +121,9 @@ TEST_F(ToleranceAnalyzer, ShiftsItsBoxesWithTheModel) {
   const Eigen::Vector3d shift(5e6, -4e6, 3e6);
   Save(FarAway(model_, Eigen::Vector3d::Zero()), folder_ / "near");
   Save(FarAway(model_, shift), folder_ / "far");
-  ASSERT_EQ(Analyze({}, "near").exit_code, 0);
+  Succeeded(Analyze({}, "near"));
   const Json here = Report();
-  ASSERT_EQ(Analyze({}, "far").exit_code, 0);
+  Succeeded(Analyze({}, "far"));
   const Json there = Report();
   ASSERT_EQ(here["boxes"].size(), model_.images.size());
   for (size_t n = 0; n < model_.images.size(); ++n) {
@@ -203,9 +192,7 @@ TEST_F(ToleranceAnalyzer, ProvesThatNoEstimateIsWithinABoundThatIsTooLow) {
 TEST_F(ToleranceAnalyzer, KeepsWhatIsFixedAndTakesItForTheGauge) {
   std::ofstream(folder_ / "fixed.txt") << model_.images[0].name << '\n'
                                        << model_.images.back().name << '\n';
-  const KrotResult result =
-      Analyze({"--fixed_images_path", folder_ / "fixed.txt"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(Analyze({"--fixed_images_path", folder_ / "fixed.txt"}));
   const Json report = Report();
   EXPECT_EQ(report["gauge"]["num_fixed_frames"], 2);
   EXPECT_TRUE(report["gauge"]["images"].empty());

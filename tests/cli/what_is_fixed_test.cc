@@ -11,8 +11,6 @@
 namespace krot::internal {
 namespace {
 
-using ::testing::HasSubstr;
-
 // Two images and some points to fix, and the files that say so.
 class WhatIsFixed : public Known {
  protected:
@@ -23,7 +21,7 @@ class WhatIsFixed : public Known {
     std::ofstream points(folder_ / "points.txt");
     for (int k = 0; k < 5; ++k) points << model.points3D[3 * k].id << "\n";
   }
-  std::vector<std::string> Options() const {
+  Words Options() const {
     return {"--fixed_images_path", folder_ / "images.txt",
             "--fixed_points_path", folder_ / "points.txt",
             "--overwrite",         "1"};
@@ -48,8 +46,7 @@ TEST_F(WhatIsFixed, KeepTheirBitsAndAreProvedInTheirPlace) {
     const Model before = SmallRigModel(sensors_per_rig);
     Save(before, folder_ / "input");
     WriteFiles(before);
-    const KrotResult result = Solve("input", "output", Options());
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const KrotResult result = Succeeded(Solve("input", "output", Options()));
     EXPECT_THAT(result.err, HasSubstr("of which 2 frames and "));
     EXPECT_THAT(result.out, HasSubstr("with what is fixed, no translations"));
     const Json report = Report("output");
@@ -72,10 +69,9 @@ TEST_F(WhatIsFixed, KeepTheirBitsAndAreProvedInTheirPlace) {
       EXPECT_EQ(after.points3D[3 * k].xyz, before.points3D[3 * k].xyz);
     }
     EXPECT_NE(after.points3D[1].xyz, before.points3D[1].xyz);
-    const KrotResult check = Check("output", "output");
-    EXPECT_EQ(check.exit_code, 0) << check.err;
+    const KrotResult check = Succeeded(Check("output", "output"));
     EXPECT_THAT(check.out, HasSubstr("as fixed where they stand"));
-    EXPECT_EQ(Check("input", "output").exit_code, 0);
+    Succeeded(Check("input", "output"));
   }
 }
 
@@ -83,7 +79,7 @@ TEST_F(WhatIsFixed, ElsewhereAreNotWhatTheCertificateSpeaksOf) {
   Model model = SmallLegacyModel();
   Save(model, folder_ / "input");
   WriteFiles(model);
-  ASSERT_EQ(Solve("input", "output", Options()).exit_code, 0);
+  Succeeded(Solve("input", "output", Options()));
   for (const size_t f : FixedFramesOf(model)) {
     model.frames[f].rig_from_world.translation[0] += 1e-9;
     model.images[f].cam_from_world = model.frames[f].rig_from_world;
@@ -99,8 +95,8 @@ TEST_F(WhatIsFixed, OfAnOptimumHaveTheSameOptimum) {
   const Model model = SmallLegacyModel();
   Save(model, folder_ / "input");
   WriteFiles(model);
-  ASSERT_EQ(Solve("input", "free").exit_code, 0);
-  ASSERT_EQ(Solve("free", "fixed", Options()).exit_code, 0);
+  Succeeded(Solve("input", "free"));
+  Succeeded(Solve("free", "fixed", Options()));
   const Json free = Report("free");
   const Json fixed = Report("fixed");
   EXPECT_GE(fixed["lower_bound"],
@@ -122,11 +118,9 @@ TEST_F(WhatIsFixed, HoldTheRestOfAModelThatHasNothingElse) {
   }
   Save(whole, folder_ / "whole");
   Save(rest, folder_ / "rest");
-  ASSERT_EQ(Solve("whole", "out_whole", Options()).exit_code, 0);
-  std::vector<std::string> options = Options();
-  options.insert(options.end(), {"--Solver.init", "feasible"});
-  const KrotResult result = Solve("rest", "out_rest", options);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(Solve("whole", "out_whole", Options()));
+  Succeeded(Solve("rest", "out_rest",
+                  Options() + Words{"--Solver.init", "feasible"}));
   const Json expected = Report("out_whole");
   const Json found = Report("out_rest");
   EXPECT_EQ(found["num_observations"], expected["num_observations"]);
@@ -142,10 +136,8 @@ TEST_F(WhatIsFixed, ThatCannotBeMeantAreRefused) {
     std::ofstream(folder_ / "list.txt") << text;
     return Solve("input", "output", {option, folder_ / "list.txt"});
   };
-  const KrotResult image = solve("--fixed_images_path", "# a\nnobody.jpg\n");
-  EXPECT_EQ(image.exit_code, 2);
-  EXPECT_THAT(image.err,
-              IsOneSentence("krot solver", "the first has image \"nobody.jpg"));
+  EXPECT_THAT(solve("--fixed_images_path", "# a\nnobody.jpg\n"),
+              IsRefused(2, "krot solver", "the first has image \"nobody.jpg"));
   const KrotResult point = solve("--fixed_points_path", "99999999\n");
   EXPECT_EQ(point.exit_code, 2);
   EXPECT_THAT(point.err, HasSubstr("found no 3D point of the model"));
@@ -154,9 +146,10 @@ TEST_F(WhatIsFixed, ThatCannotBeMeantAreRefused) {
   EXPECT_THAT(solve("--fixed_images_path", model.images[1].name).err,
               HasSubstr("which stands nowhere"));
   WriteFiles(model);
-  std::vector<std::string> options = Options();
-  options.insert(options.end(), {"--Solver.max_error", "3"});
-  EXPECT_EQ(Solve("input", "output", options).exit_code, 1);
+  EXPECT_EQ(
+      Solve("input", "output", Options() + Words{"--Solver.max_error", "3"})
+          .exit_code,
+      1);
 }
 
 TEST_F(WhatIsFixed, FarAwayIsProvedInItsPlace) {
@@ -164,8 +157,7 @@ TEST_F(WhatIsFixed, FarAwayIsProvedInItsPlace) {
   const Model model = FarAway(SmallLegacyModel(), shift);
   Save(model, folder_ / "far");
   WriteFiles(model);
-  const KrotResult result = Solve("far", "output", Options());
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(Solve("far", "output", Options()));
   EXPECT_EQ(Report("output")["termination"], "gap_reached");
   const Model after = Load(folder_ / "output");
   for (const size_t f : FixedFramesOf(model)) {
@@ -173,25 +165,21 @@ TEST_F(WhatIsFixed, FarAwayIsProvedInItsPlace) {
               model.frames[f].rig_from_world.translation);
   }
   EXPECT_EQ(after.points3D[0].xyz, model.points3D[0].xyz);
-  const KrotResult check = Check("output", "output");
-  EXPECT_EQ(check.exit_code, 0) << check.err;
+  Succeeded(Check("output", "output"));
 }
 
 TEST_F(WhatIsFixed, StaysThroughPolishAndBundleAdjustment) {
   const Model model = SmallLegacyModel();
   Save(model, folder_ / "input");
   WriteFiles(model);
-  for (std::vector<std::string> command : std::vector<std::vector<std::string>>{
+  for (const Words& command : std::vector<Words>{
            {"solver", "--Solver.polish", "full"},
            {"bundle_adjuster"},
            {"bundle_adjuster", "--BundleAdjustment.max_error_factor", "1.1"}}) {
     SCOPED_TRACE(::testing::PrintToString(command));
-    const std::vector<std::string> options = Options();
-    command.insert(command.end(), options.begin(), options.end());
-    command.insert(command.end(), {"--input_path", folder_ / "input",
-                                   "--output_path", folder_ / "output"});
-    const KrotResult result = RunKrot(command);
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+    Succeeded(
+        RunKrot(command + Options(), {"--input_path", folder_ / "input",
+                                      "--output_path", folder_ / "output"}));
     const Model after = Load(folder_ / "output");
     for (const size_t f : FixedFramesOf(model)) {
       EXPECT_EQ(after.frames[f].rig_from_world.translation,

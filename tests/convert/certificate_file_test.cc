@@ -1,10 +1,14 @@
 #include "krot/convert/certificate_file.h"
 
+#include <openssl/sha.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -16,19 +20,20 @@
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
 #include "tests/convert/pixel_optimum.h"
+#include "tests/testing/model_matchers.h"
 #include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
+
 using Json = nlohmann::ordered_json;
 
 Model MakeModel(int sensors_per_rig, uint64_t seed = 1) {
-  SceneOptions options = SceneOf(6, 60, 6, 0.7);
+  SceneOptions options = SceneOf(6, 60, 6, 0.7, seed);
   options.has_rigs = sensors_per_rig > 1;
   options.sensors_per_rig = sensors_per_rig;
-  options.random_seed = seed;
   return SynthesizeScene(options).model;
 }
 
@@ -286,12 +291,7 @@ class WrongCertificateFile : public ::testing::Test {
   }
 
   static std::string MessageOf(const std::string& text) {
-    try {
-      ParseCertificate(text, "c.json");
-    } catch (const ModelError& error) {
-      return error.what();
-    }
-    return "none";
+    return ModelErrorOf([&] { ParseCertificate(text, "c.json"); });
   }
 
   Solved solved_ = Solve(MakeModel(1), Norm::L2());
@@ -333,6 +333,23 @@ TEST_F(WrongCertificateFile, IsNamedWithThePlaceAndWhatWasExpected) {
 TEST(ReadCertificateFile, SaysWhichFileCannotBeRead) {
   EXPECT_THROW(ReadCertificateFile("/nonexistent/c.json"), ModelError);
   EXPECT_THROW(ReadCertificateFile(::testing::TempDir()), ModelError);
+}
+
+TEST(Sha256, AgreesWithOpenSslAtEveryLengthAroundItsBlocks) {
+  std::mt19937 random(1);
+  for (size_t size = 0; size < 300; ++size) {
+    std::string bytes(size, '\0');
+    for (char& byte : bytes) byte = static_cast<char>(random());
+    std::array<unsigned char, 32> digest;
+    SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), size,
+           digest.data());
+    std::string expected;
+    for (const unsigned char byte : digest) {
+      expected += "0123456789abcdef"[byte >> 4];
+      expected += "0123456789abcdef"[byte & 15];
+    }
+    EXPECT_EQ(Sha256(bytes), expected) << size;
+  }
 }
 
 }  // namespace

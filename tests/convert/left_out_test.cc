@@ -1,17 +1,21 @@
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string>
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
 #include "krot/camera/camera_model.h"
 #include "krot/convert/build_problem.h"
+#include "krot/convert/reprojection.h"
+#include "krot/model.h"
 #include "krot/model/rigs.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
+#include "tests/convert/lens_model.h"
 #include "tests/testing/scene_of.h"
 
 namespace krot::internal {
@@ -232,6 +236,96 @@ TEST(LeftOut, APanoramaSeesWhatIsBehindIt) {
   EXPECT_THAT(built.left_out, ::testing::Each(0));
   EXPECT_EQ(built.num_retriangulated_points, 0);
   ExpectBooksBalance(model, built);
+}
+
+// A fifth of the observations have a twin in their image.
+SyntheticScene SceneWithTwins() {
+  SceneOptions options = SceneOf(6, 50, 4);
+  options.duplicate_ratio = 0.2;
+  return SynthesizeScene(options);
+}
+
+BuiltProblem Build(const Model& model, SameImage same_image) {
+  BuildProblemOptions options;
+  options.same_image = same_image;
+  return BuildProblem(model, options);
+}
+
+TEST(SameImage, OfTwinsTheOneClosestToTheReprojectionStays) {
+  const Model& truth = SceneWithTwins().ground_truth;
+  const BuiltProblem all = Build(truth, SameImage::kKeep);
+  const BuiltProblem closest = Build(truth, SameImage::kClosest);
+  EXPECT_GT(all.num_same_image_tracks, 0);
+  EXPECT_EQ(closest.num_same_image_tracks, all.num_same_image_tracks);
+  const auto left_out =
+      closest.left_out[static_cast<size_t>(LeftOut::kSameImage)];
+  EXPECT_EQ(closest.pixels.size() + static_cast<size_t>(left_out),
+            all.pixels.size());
+  // Observations without noise have no error, and their twins have one.
+  const Reprojection reprojection(truth, closest);
+  for (size_t i = 0; i < closest.pixels.size(); ++i) {
+    EXPECT_LT(
+        reprojection.Error(closest.start, Norm::L2(), static_cast<int64_t>(i)),
+        1e-6);
+  }
+  for (int32_t k = 0; k < closest.problem.num_points; ++k) {
+    const int64_t begin = closest.problem.point_begin[k];
+    EXPECT_FALSE(HasImageTwice(
+        &closest.problem.observations[begin],
+        static_cast<int>(closest.problem.point_begin[k + 1] - begin)));
+  }
+}
+
+TEST(SameImage, KeepsAllByDefault) {
+  const SyntheticScene scene = SceneWithTwins();
+  EXPECT_EQ(BuildProblem(scene.model, {}).pixels.size(),
+            scene.model.track_elements.size());
+}
+
+// Point 0 is seen by image 0 alone, so that it takes no part.
+Model ModelWithAShortTrack() {
+  Model model = MakeLensModel({});
+  const uint64_t num_images = model.images.size();
+  for (uint64_t e = 1; e < num_images; ++e) {
+    model.images[e].points2D[0].point3D_id = kInvalidPoint3DId;
+  }
+  model.track_elements.erase(model.track_elements.begin() + 1,
+                             model.track_elements.begin() + num_images);
+  model.points3D[0].track_end = 1;
+  for (size_t k = 1; k < model.points3D.size(); ++k) {
+    model.points3D[k].track_begin -= num_images - 1;
+    model.points3D[k].track_end -= num_images - 1;
+  }
+  return model;
+}
+
+TEST(CarryLeftOutPoints, KeepsTheErrorOfAPointWhoseOnlyImageHasMoved) {
+  const Model before = ModelWithAShortTrack();
+  const BuiltProblem built = BuildProblem(before, {});
+  ASSERT_EQ(built.problem.num_points,
+            static_cast<int>(before.points3D.size()) - 1);
+  const std::vector<double> errors_px = PixelErrors(before);
+  Model moved = before;
+  moved.frames[0].rig_from_world.translation += Eigen::Vector3d(0.3, 0.1, 0);
+  ASSERT_GT(PixelErrors(moved)[0], errors_px[0] + 10);
+
+  Model after = moved;
+  CarryLeftOutPoints(before, errors_px, Norm::L2(), built, {},
+                     /*level=*/1e-3, &after);
+  EXPECT_NEAR(PixelErrors(after)[0], errors_px[0], 1e-9);
+  for (size_t k = 1; k < after.points3D.size(); ++k) {
+    EXPECT_EQ(after.points3D[k].xyz, before.points3D[k].xyz);
+  }
+}
+
+TEST(CarryLeftOutPoints, LeavesAPointWhoseErrorIsBelowTheLevel) {
+  const Model before = ModelWithAShortTrack();
+  Model after = before;
+  after.images[0].cam_from_world.translation += Eigen::Vector3d(0.3, 0.1, 0);
+  CarryLeftOutPoints(before, PixelErrors(before), Norm::L2(),
+                     BuildProblem(before, {}), {},
+                     /*level=*/1e4, &after);
+  EXPECT_EQ(after.points3D[0].xyz, before.points3D[0].xyz);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ using Json = nlohmann::json;
 
 Comparison CompareWithTruth(const fs::path& model, const fs::path& truth,
                             const fs::path& output) {
-  const ScriptResult run =
+  const KrotResult run =
       RunScript("compare_linf_with_ba.sh",
                 {"--input_path", model.string(), "--truth_path", truth.string(),
                  "--output_path", output.string()});

@@ -204,7 +204,7 @@ TEST_F(EndToEnd, OutliersAreForARobustLossAndAFilterFirst) {
 
 TEST_F(EndToEnd, TheMappersScriptMakesModelProofReportAndOverlay) {
   const fs::path output = output_ / "sparse";
-  const ScriptResult run = RunScript(
+  const KrotResult run = RunScript(
       "mapper_then_krot.sh",
       {"--database_path", (*folder_ / "sharp/database.db").string(),
        "--image_path", (*folder_ / "sharp_photos").string(), "--output_path",

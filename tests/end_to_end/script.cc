@@ -8,8 +8,7 @@
 
 namespace krot::internal {
 
-ScriptResult RunScript(const std::string& name,
-                       const std::vector<std::string>& arguments) {
+KrotResult RunScript(const std::string& name, const Words& arguments) {
   const TempFolder folder;
   std::string command =
       "KROT='" KROT_EXECUTABLE "' '" KROT_SCRIPTS "/" + name + "'";

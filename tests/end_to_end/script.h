@@ -1,18 +1,12 @@
 #pragma once
 
 #include <string>
-#include <vector>
+
+#include "tests/cli/krot_process.h"
 
 namespace krot::internal {
 
-struct ScriptResult {
-  int exit_code = -1;
-  std::string out;
-  std::string err;
-};
-
 // Runs tools/scripts/`name` with the krot that this build made.
-ScriptResult RunScript(const std::string& name,
-                       const std::vector<std::string>& arguments);
+KrotResult RunScript(const std::string& name, const Words& arguments);
 
 }  // namespace krot::internal

@@ -9,7 +9,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "krot/model.h"
 #include "krot/synthetic/scene.h"
@@ -28,13 +27,11 @@ class Scripts : public ::testing::Test {
  protected:
   Scripts() { Save(SmallLegacyModel(), folder_ / "model"); }
 
-  void ExpectRefused(const std::string& name,
-                     const std::vector<std::string>& arguments,
+  void ExpectRefused(const std::string& name, const Words& arguments,
                      const std::string& part) const {
-    const std::vector<std::string> before = FileNames(folder_.path());
-    const ScriptResult result = RunScript(name, arguments);
-    EXPECT_EQ(result.exit_code, 1);
-    EXPECT_THAT(result.err, IsOneSentence(name, part));
+    const Words before = FileNames(folder_.path());
+    const KrotResult result = RunScript(name, arguments);
+    EXPECT_THAT(result, IsRefused(1, name, part));
     EXPECT_EQ(result.out, "");
     EXPECT_EQ(FileNames(folder_.path()), before);
   }
@@ -46,10 +43,8 @@ TEST_F(Scripts, SayHowTheyAreUsed) {
   for (const char* name : {"mapper_then_krot.sh", "compare_linf_with_ba.sh",
                            "strecha_to_colmap.sh", "bal_to_colmap.sh",
                            "geodetic_to_positions.sh"}) {
-    const ScriptResult result = RunScript(name, {"-h"});
-    EXPECT_EQ(result.exit_code, 0);
-    EXPECT_THAT(result.out,
-                ::testing::HasSubstr("Usage: " + std::string(name)));
+    const KrotResult result = Succeeded(RunScript(name, {"-h"}));
+    EXPECT_THAT(result.out, HasSubstr("Usage: " + std::string(name)));
     EXPECT_EQ(result.err, "");
   }
 }
@@ -120,18 +115,15 @@ TEST_F(Scripts, CheckACertificateWithoutKrot) {
   }
   const std::string solved = folder_ / "solved";
   const fs::path certificate = folder_ / "certificate.json";
-  ASSERT_EQ(RunKrot({"solver", "--input_path", KROT_SAMPLE "/model",
+  Succeeded(RunKrot({"solver", "--input_path", KROT_SAMPLE "/model",
                      "--output_path", solved, "--output_type", "TXT",
-                     "--certificate_path", certificate})
-                .exit_code,
-            0);
-  const ScriptResult result =
-      RunScript("check_certificate.py", {certificate, solved});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, ::testing::HasSubstr("no estimate has all errors"));
+                     "--certificate_path", certificate}));
+  const KrotResult result =
+      Succeeded(RunScript("check_certificate.py", {certificate, solved}));
+  EXPECT_THAT(result.out, HasSubstr("no estimate has all errors"));
 
   // A bound that is higher by 1e-6 is not proved.
-  auto json = nlohmann::json::parse(ReadBytes(certificate));
+  auto json = ReadJson(certificate);
   json["lower_bound"] = (1 + 1e-6) * json["lower_bound"].get<double>();
   WriteBytes(certificate, json.dump());
   EXPECT_NE(RunScript("check_certificate.py", {certificate, solved}).exit_code,
@@ -186,11 +178,10 @@ TEST_F(Scripts, ReadAPhotogrammetricProject) {
     }
   }
   for (std::ofstream* file : {&camera, &names, &eo, &points}) file->close();
-  const ScriptResult result = RunScript(
+  Succeeded(RunScript(
       "photogrammetry_to_colmap.py",
       {"dbat", folder_ / "camera.xml", folder_ / "images.txt",
-       folder_ / "eo.txt", folder_ / "points.txt", folder_ / "converted"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+       folder_ / "eo.txt", folder_ / "points.txt", folder_ / "converted"}));
   const Model converted = Load(folder_ / "converted");
   EXPECT_EQ(converted.points3D.size(), scene.points3D.size());
   const PixelErrorStatistics errors = Summarize(PixelErrors(converted));
@@ -200,7 +191,7 @@ TEST_F(Scripts, ReadAPhotogrammetricProject) {
     EXPECT_LT((converted.points3D[k].xyz - scene.points3D[k].xyz).norm(), 1e-6);
   }
 
-  const ScriptResult of_other_files = RunScript(
+  const KrotResult of_other_files = RunScript(
       "photogrammetry_to_colmap.py",
       {"dbat", folder_ / "eo.txt", folder_ / "images.txt", folder_ / "eo.txt",
        folder_ / "points.txt", folder_ / "other"});
@@ -217,13 +208,12 @@ bool HasColmapAndJq() {
 TEST_F(Scripts, CompareWithTheInputWhereNoTruthIsGiven) {
   if (!HasColmapAndJq()) GTEST_SKIP() << "needs colmap and jq";
   const fs::path output = folder_ / "compared";
-  const ScriptResult result =
-      RunScript("compare_linf_with_ba.sh", {"--input_path", folder_ / "model",
-                                            "--output_path=" + output.string(),
-                                            "--max_error_factor", "1.3"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const KrotResult result = Succeeded(RunScript(
+      "compare_linf_with_ba.sh",
+      {"--input_path", folder_ / "model", "--output_path=" + output.string(),
+       "--max_error_factor", "1.3"}));
   EXPECT_THAT(result.out, ::testing::StartsWith("Cameras: against the input"));
-  EXPECT_THAT(result.out, ::testing::HasSubstr("bounded, 1.3 x the lowest"));
+  EXPECT_THAT(result.out, HasSubstr("bounded, 1.3 x the lowest"));
 
   // The largest error of a result, recomputed from its files.
   const auto max_error = [&output](const std::string& name) {
@@ -234,7 +224,7 @@ TEST_F(Scripts, CompareWithTheInputWhereNoTruthIsGiven) {
     EXPECT_LT(max_error("linf"), max_error(name)) << name;
     std::ostringstream number;
     number << std::fixed << std::setprecision(4) << max_error(name);
-    EXPECT_THAT(result.out, ::testing::HasSubstr(number.str())) << name;
+    EXPECT_THAT(result.out, HasSubstr(number.str())) << name;
   }
 }
 
@@ -243,13 +233,13 @@ TEST_F(Scripts, SayWhereACommandThatFailedSaysWhy) {
   if (!HasColmapAndJq()) GTEST_SKIP() << "needs colmap and jq";
   Save(WithShortTracks(SmallLegacyModel(), 1), folder_ / "short");
   const fs::path output = folder_ / "compared";
-  const ScriptResult result =
+  const KrotResult result =
       RunScript("compare_linf_with_ba.sh",
                 {"--input_path", folder_ / "short", "--output_path", output});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(result.out, "");
   const std::string log = output / "reports/colmap_ba.log";
-  EXPECT_THAT(result.err, ::testing::HasSubstr("failed, as " + log + " says"));
+  EXPECT_THAT(result.err, HasSubstr("failed, as " + log + " says"));
   EXPECT_NE(ReadBytes(log), "");
 }
 
@@ -285,10 +275,9 @@ TEST_F(Scripts, TakeSurveyedCamerasToColmap) {
     WriteBytes(folder_ / "survey" / name,
                CameraFile(rotations.back(), centers.back()));
   }
-  const ScriptResult result = RunScript(
-      "strecha_to_colmap.sh",
-      {"--input_path", folder_ / "survey", "--output_path", folder_ / "truth"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Succeeded(
+      RunScript("strecha_to_colmap.sh", {"--input_path", folder_ / "survey",
+                                         "--output_path", folder_ / "truth"}));
   const Model truth = Load(folder_ / "truth");
   ASSERT_EQ(truth.images.size(), rotations.size());
   for (size_t i = 0; i < rotations.size(); ++i) {
@@ -319,11 +308,11 @@ TEST_F(Scripts, RefuseSurveyedCamerasThatTheyCannotRepresent) {
     const fs::path survey = folder_ / ("survey" + std::to_string(++i));
     WriteBytes(survey / "0.jpg.camera", file);
     const fs::path output = folder_ / ("output" + std::to_string(i));
-    const ScriptResult result =
+    const KrotResult result =
         RunScript("strecha_to_colmap.sh",
                   {"--input_path", survey, "--output_path", output});
     EXPECT_NE(result.exit_code, 0);
-    EXPECT_THAT(result.err, ::testing::HasSubstr(part));
+    EXPECT_THAT(result.err, HasSubstr(part));
     EXPECT_FALSE(fs::exists(output));
   }
 }
@@ -383,10 +372,9 @@ BalProblem MakeBalProblem(int num_cameras, int num_points) {
 TEST_F(Scripts, TakeBundleAdjustmentInTheLargeToColmapWithItsErrors) {
   const BalProblem problem = MakeBalProblem(4, 12);
   WriteBytes(folder_ / "problem.txt", problem.text);
-  const ScriptResult result =
+  Succeeded(
       RunScript("bal_to_colmap.sh", {"--input_path", folder_ / "problem.txt",
-                                     "--output_path", folder_ / "bal"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+                                     "--output_path", folder_ / "bal"}));
   const Model model = Load(folder_ / "bal");
   EXPECT_EQ(model.images.size(), 4u);
   const std::vector<double> errors = PixelErrors(model);
@@ -408,11 +396,9 @@ TEST_F(Scripts, TakeTextsOfWindows) {
   WriteBytes(folder_ / "unix.txt", text);
   WriteBytes(folder_ / "windows.txt", OfWindows(text));
   for (const char* name : {"unix", "windows"}) {
-    const ScriptResult result =
-        RunScript("bal_to_colmap.sh",
-                  {"--input_path", folder_ / (std::string(name) + ".txt"),
-                   "--output_path", folder_ / name});
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+    Succeeded(RunScript("bal_to_colmap.sh",
+                        {"--input_path", folder_ / (std::string(name) + ".txt"),
+                         "--output_path", folder_ / name}));
   }
   EXPECT_THAT(Load(folder_ / "windows"), IsModel(Load(folder_ / "unix")));
 }
@@ -447,10 +433,10 @@ TEST_F(Scripts, RefuseWhatIsNoProblemOfBundleAdjustmentInTheLarge) {
     const fs::path path = folder_ / ("problem" + std::to_string(++i) + ".txt");
     WriteBytes(path, file);
     const fs::path output = folder_ / ("output" + std::to_string(i));
-    const ScriptResult result = RunScript(
+    const KrotResult result = RunScript(
         "bal_to_colmap.sh", {"--input_path", path, "--output_path", output});
     EXPECT_NE(result.exit_code, 0);
-    EXPECT_THAT(result.err, ::testing::HasSubstr(part));
+    EXPECT_THAT(result.err, HasSubstr(part));
     EXPECT_FALSE(fs::exists(output));
   }
 }
@@ -475,11 +461,10 @@ TEST_F(Scripts, TakeGeodeticCoordinatesToALocalFrame) {
   WriteBytes(folder_ / "gps.txt",
              "# name, place, radius\na.jpg 48.1 16.2 200 5\n"
              "b.jpg 48.102 16.197 231.5 1 1 3\n");
-  const std::vector<std::string> arguments = {
-      "--origin",          "48.1 16.2 200", "--input_path",
-      folder_ / "gps.txt", "--output_path", folder_ / "positions.txt"};
-  const ScriptResult result = RunScript("geodetic_to_positions.sh", arguments);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Words arguments = {"--origin",      "48.1 16.2 200",
+                           "--input_path",  folder_ / "gps.txt",
+                           "--output_path", folder_ / "positions.txt"};
+  Succeeded(RunScript("geodetic_to_positions.sh", arguments));
   std::istringstream text(ReadBytes(folder_ / "positions.txt"));
   std::string line, name;
   Eigen::Vector3d enu, axes;
@@ -503,11 +488,10 @@ TEST_F(Scripts, TakeGeodeticCoordinatesToALocalFrame) {
       folder_ / "gps.csv",
       OfWindows("name,lat,lon,height\n"
                 "my a.jpg,48.1,16.2,200\nmy b.jpg\t48.102\t16.197\t231.5\n"));
-  const ScriptResult table =
+  const KrotResult table = Succeeded(
       RunScript("geodetic_to_positions.sh",
                 {"--origin", "48.1 16.2 200", "--input_path",
-                 folder_ / "gps.csv", "--output_path", folder_ / "table.txt"});
-  ASSERT_EQ(table.exit_code, 0) << table.err;
+                 folder_ / "gps.csv", "--output_path", folder_ / "table.txt"}));
   std::ostringstream expected;
   expected << std::fixed << std::setprecision(6)
            << "my a.jpg 0.000000 0.000000 0.000000\nmy b.jpg " << enu[0] << ' '
@@ -522,12 +506,12 @@ TEST_F(Scripts, TakeGeodeticCoordinatesToALocalFrame) {
            {"# nothing\n", "found no position"}}) {
     const fs::path path = folder_ / ("gps" + std::to_string(++i) + ".txt");
     WriteBytes(path, file);
-    const ScriptResult refused =
+    const KrotResult refused =
         RunScript("geodetic_to_positions.sh",
                   {"--origin", "48.1 16.2 200", "--input_path", path,
                    "--output_path", folder_ / "none.txt"});
     EXPECT_NE(refused.exit_code, 0);
-    EXPECT_THAT(refused.err, ::testing::HasSubstr(part));
+    EXPECT_THAT(refused.err, HasSubstr(part));
     EXPECT_FALSE(fs::exists(folder_ / "none.txt"));
   }
 }

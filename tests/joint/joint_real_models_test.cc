@@ -1,5 +1,3 @@
-// SolveJoint on real models against the optima of a reference solver.
-
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -10,9 +8,13 @@
 #include "krot/joint/joint.h"
 #include "krot/model/model_io.h"
 #include "krot/problem/cost.h"
+#include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
+
+// SolveJoint on real models against the optima of a reference solver.
 
 constexpr double kReferenceGap = 1e-4;  // the reference's own, too
 
@@ -102,6 +104,34 @@ INSTANTIATE_TEST_SUITE_P(Local, FindStartOfRealModel,
                                                    3.5041},
                                          RealModel{"two_cameras44", 2.9279}),
                          Name);
+
+// Outliers of hundreds of pixels: points slide into cameras on the way down,
+// the interior point stalls above the optimum, and few observations decide.
+TEST(SolveJoint, ProvesTheOptimumOfModelsWithGrossOutliers) {
+  for (const SceneLayout layout : {SceneLayout::kOrbit, SceneLayout::kStreet}) {
+    for (const unsigned seed : {1u, 2u, 3u}) {
+      SCOPED_TRACE(testing::Message()
+                   << static_cast<int>(layout) << ", seed " << seed);
+      SceneOptions scene = SceneOf(8, 200, 4, 0.5, seed);
+      scene.layout = layout;
+      scene.outlier_ratio = 0.02;
+      const BuiltProblem built = BuildProblem(SynthesizeScene(scene).model, {});
+      JointOptions options;
+      options.relative_gap = 1e-4;
+      Estimate estimate = built.start;
+      const JointSummary summary =
+          SolveJoint(built.problem, options, {}, &estimate);
+      EXPECT_GT(summary.cost_final, 10);
+      ASSERT_TRUE(summary.certificate);
+      const CertificateCheck check =
+          CheckCertificate(built.problem, options.norm, *summary.certificate);
+      EXPECT_TRUE(check.is_accepted) << check.refusal;
+      const double cost = Cost(built.problem, estimate, options.norm, 1);
+      EXPECT_LE(check.proved_bound, cost);
+      EXPECT_GE(check.proved_bound, (1 - options.relative_gap) * cost);
+    }
+  }
+}
 
 }  // namespace
 }  // namespace krot::internal

@@ -2,12 +2,16 @@
 
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "krot/base/numbers.h"
+#include "krot/model/derived_models.h"
+#include "krot/model/rigs.h"
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
@@ -238,6 +242,99 @@ TEST(ValidateModel, RefusesSensorsWhoseRotationCannotBeNormalised) {
                 }),
                 HasSubstr("rig 5: found the quaternion 0 0 "));
   }
+}
+
+struct Record {
+  uint64_t id;
+};
+
+// Consecutive ids are looked up in a table, sparse ones in a sorted list.
+const std::vector<Record> kDense = {{3}, {0}, {7}};
+const std::vector<Record> kSparse = {
+    {std::numeric_limits<uint64_t>::max()}, {5}, {1000000007}};
+
+TEST(IdIndex, FindsWhatIsThereAndNothingElse) {
+  for (const auto& records : {kDense, kSparse}) {
+    const IdIndex<uint64_t> index(records);
+    for (size_t i = 0; i < records.size(); ++i) {
+      EXPECT_EQ(index.Find(records[i].id), static_cast<int32_t>(i));
+    }
+    for (const uint64_t id :
+         {uint64_t{1}, uint64_t{6}, uint64_t{8}, uint64_t{1} << 63}) {
+      EXPECT_EQ(index.Find(id), std::nullopt);
+    }
+    EXPECT_EQ(index.duplicate(), std::nullopt);
+  }
+}
+
+TEST(IdIndex, NamesADuplicateAndFindsTheFirst) {
+  for (std::vector<Record> records : {kDense, kSparse}) {
+    const uint64_t id = records[1].id;
+    records.push_back({id});
+    const IdIndex<uint64_t> index(records);
+    EXPECT_EQ(index.duplicate(), id);
+    EXPECT_EQ(index.Find(id), 1);
+  }
+}
+
+TEST(IdIndex, OfNothingFindsNothing) {
+  EXPECT_EQ(IdIndex<uint64_t>(std::vector<Record>()).Find(0), std::nullopt);
+}
+
+// Two images; point 10 has observations 0 of both, and 0 of the first twice;
+// point 11 has observations 1 of both.
+Model MakeModel() {
+  Model model;
+  model.cameras.push_back({1, 0, 100, 100, {100, 50, 50}});
+  for (const ImageId id : {1u, 2u}) {
+    Image image;
+    image.id = id;
+    image.camera_id = 1;
+    image.name = std::to_string(id);
+    image.points2D = {{10, 10, 10}, {20, 20, 11}};
+    model.images.push_back(image);
+  }
+  model.track_elements = {{1, 0}, {2, 0}, {1, 0}, {1, 1}, {2, 1}};
+  Point3D point;
+  point.id = 10;
+  point.track_end = 3;
+  model.points3D.push_back(point);
+  point.id = 11;
+  point.track_begin = 3;
+  point.track_end = 5;
+  model.points3D.push_back(point);
+  UseTrivialRigs(&model);
+  return model;
+}
+
+TEST(RemoveObservations, TakesATrackOfOneWithIt) {
+  const RemovedObservations removed =
+      RemoveObservations(MakeModel(), {0, 0, 0, 1, 0});
+  ValidateModel(removed.model);
+  ASSERT_EQ(removed.model.points3D.size(), 1u);
+  EXPECT_EQ(removed.num_points, 1);
+  EXPECT_EQ(removed.num_left_alone, 1);
+  EXPECT_THAT(removed.element_of, testing::ElementsAre(0, 1, 2));
+  for (const Image& image : removed.model.images) {
+    EXPECT_EQ(image.points2D[1].point3D_id, kInvalidPoint3DId);
+    EXPECT_EQ(image.points2D[0].point3D_id, 10u);
+  }
+}
+
+TEST(RemoveObservations, KeepsA2DPointThatTheTrackHoldsASecondTime) {
+  const RemovedObservations removed =
+      RemoveObservations(MakeModel(), {1, 0, 0, 0, 0});
+  ValidateModel(removed.model);
+  EXPECT_EQ(removed.model.images[0].points2D[0].point3D_id, 10u);
+  EXPECT_THAT(removed.element_of, testing::ElementsAre(1, 2, 3, 4));
+}
+
+TEST(RemoveObservations, OfNothingIsTheModel) {
+  const RemovedObservations removed =
+      RemoveObservations(MakeModel(), {0, 0, 0, 0, 0});
+  EXPECT_EQ(removed.model.track_elements.size(), 5u);
+  EXPECT_EQ(removed.num_points, 0);
+  EXPECT_THROW(RemoveObservations(MakeModel(), {0}), std::invalid_argument);
 }
 
 }  // namespace

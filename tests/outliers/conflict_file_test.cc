@@ -9,6 +9,7 @@
 #include "krot/context.h"
 #include "krot/outliers/conflict.h"
 #include "tests/outliers/outlier_scenes.h"
+#include "tests/testing/model_matchers.h"
 
 namespace krot::internal {
 namespace {
@@ -153,13 +154,8 @@ TEST(ConflictFile, IsRefusedWhereItsBoundsAreTamperedWith) {
 
 TEST(ConflictFile, NamesThePlaceThatCannotBeRead) {
   const std::string json = ConflictJson(PackedScene().file);
-  const auto message = [](const std::string& text) -> std::string {
-    try {
-      ParseConflicts(text, "name");
-    } catch (const ModelError& error) {
-      return error.what();
-    }
-    return "";
+  const auto message = [](const std::string& text) {
+    return ModelErrorOf([&] { ParseConflicts(text, "name"); });
   };
   EXPECT_THAT(message("{"), HasSubstr("name: no JSON"));
   EXPECT_THAT(message("{\"version\": 7}"), HasSubstr("version is 7"));

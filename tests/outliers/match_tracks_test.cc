@@ -25,9 +25,7 @@ using ::testing::IsEmpty;
 using Track = std::vector<std::pair<ImageId, uint32_t>>;
 
 Model MatchedScene(double pixel_noise = 0) {
-  SceneOptions options = SceneOf(10, 800, 5, pixel_noise);
-  options.random_seed = 4;
-  return SynthesizeScene(options).ground_truth;
+  return SynthesizeScene(SceneOf(10, 800, 5, pixel_noise, 4)).ground_truth;
 }
 
 Model PosesOf(Model model) {
@@ -217,16 +215,13 @@ TEST(TriangulateMatches, TakesOfTwoKeypointsOfAnImageTheNearerOne) {
 TEST(TriangulateMatches, DependsOnNoOrderAndNoNumberOfThreads) {
   const Model truth = MatchedScene(1);
   Database database = DatabaseOf(truth);
-  Context one, three;
-  one.num_threads = 1;
-  three.num_threads = 3;
-  const Model a = TriangulateMatches(PosesOf(truth), database, {}, one).model;
+  const Model a = TriangulateMatches(PosesOf(truth), database, {}, {1}).model;
   std::mt19937 random(2);
   std::shuffle(database.pairs.begin(), database.pairs.end(), random);
   for (VerifiedPair& pair : database.pairs) {
     std::shuffle(pair.matches.begin(), pair.matches.end(), random);
   }
-  const Model b = TriangulateMatches(PosesOf(truth), database, {}, three).model;
+  const Model b = TriangulateMatches(PosesOf(truth), database, {}, {3}).model;
   EXPECT_THAT(b, IsModel(a));
 }
 

@@ -109,11 +109,8 @@ TEST(FilterOutliers, RemovesNoMoreThanTheThresholdDoes) {
 
 TEST(FilterOutliers, HasTheSameBitsAtOneAndTwoThreads) {
   const SyntheticScene scene = MakeOutlierScene(7, 0.05, 80);
-  Context one, two;
-  one.num_threads = 1;
-  two.num_threads = 2;
-  const OutlierFilterResult a = FilterOutliers(scene.model, Within(2), one);
-  const OutlierFilterResult b = FilterOutliers(scene.model, Within(2), two);
+  const OutlierFilterResult a = FilterOutliers(scene.model, Within(2), {1});
+  const OutlierFilterResult b = FilterOutliers(scene.model, Within(2), {2});
   EXPECT_EQ(ConflictJson(*a.summary.conflicts),
             ConflictJson(*b.summary.conflicts));
   ASSERT_EQ(a.model.points3D.size(), b.model.points3D.size());
@@ -309,11 +306,8 @@ TEST(FilterOutliers, BySnoopingGivesBackWhatNoiseExplains) {
 
 TEST(FilterOutliers, BySnoopingHasTheSameBitsAtAnyNumberOfThreads) {
   const SyntheticScene scene = MakeOutlierScene(6, 0.03, 200);
-  Context one, four;
-  one.num_threads = 1;
-  four.num_threads = 4;
-  const Model a = FilterOutliers(scene.model, Snooping(), one).model;
-  const Model b = FilterOutliers(scene.model, Snooping(), four).model;
+  const Model a = FilterOutliers(scene.model, Snooping(), {1}).model;
+  const Model b = FilterOutliers(scene.model, Snooping(), {4}).model;
   ASSERT_EQ(a.points3D.size(), b.points3D.size());
   for (size_t k = 0; k < a.points3D.size(); ++k) {
     EXPECT_EQ(a.points3D[k].xyz, b.points3D[k].xyz);

@@ -10,10 +10,9 @@ namespace krot::internal {
 // Small scenes with pinhole cameras, noise and outliers.
 inline SceneOptions OutlierScene(uint64_t seed, double outlier_ratio,
                                  int num_points, double pixel_noise) {
-  SceneOptions options = SceneOf(6, num_points, 4, pixel_noise);
+  SceneOptions options = SceneOf(6, num_points, 4, pixel_noise, seed);
   options.camera_model_id = 1;
   options.outlier_ratio = outlier_ratio;
-  options.random_seed = seed;
   return options;
 }
 

@@ -23,11 +23,10 @@ namespace krot::internal {
 namespace {
 
 SceneOptions Scene(double outlier_ratio, double rotation_noise_deg) {
-  SceneOptions options = SceneOf(12, 400, 5, 0.5);
+  SceneOptions options = SceneOf(12, 400, 5, 0.5, 5);
   options.camera_model_id = 1;
   options.outlier_ratio = outlier_ratio;
   options.rotation_noise_deg = rotation_noise_deg;
-  options.random_seed = 5;
   return options;
 }
 

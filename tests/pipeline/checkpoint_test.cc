@@ -14,6 +14,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/pipeline/solve_by_ranks.h"
+#include "tests/testing/model_matchers.h"
 #include "tests/testing/temp_folder.h"
 
 namespace krot::internal {
@@ -172,12 +173,7 @@ class CheckpointFileTest : public ::testing::Test {
     checkpoint.Append(step);
   }
   std::string Refusal() const {
-    try {
-      CheckpointFile checkpoint(file_, run_);
-    } catch (const CheckpointError& error) {
-      return error.what();
-    }
-    return "";
+    return MessageOf<CheckpointError>([&] { CheckpointFile(file_, run_); });
   }
 
   TempFolder folder_;

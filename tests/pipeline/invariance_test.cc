@@ -22,11 +22,10 @@ constexpr double kSolvedGap = 1e-5;
 constexpr double kTolerance = 2 * kSolvedGap;
 
 Model InvariantScene() {
-  SceneOptions options = SceneOf(7, 80, 4, 0.5);
+  SceneOptions options = SceneOf(7, 80, 4, 0.5, 8);
   options.sensors_per_rig = 2;
   options.start_translation_noise = 0.004;
   options.start_point_noise = 0.004;
-  options.random_seed = 8;
   return SynthesizeScene(options).model;
 }
 

@@ -33,9 +33,8 @@ using Of = KnownPosition::Of;
 constexpr double kKept = 1e-6;  // of a radius
 
 SceneOptions Options() {
-  SceneOptions options = SceneOf(6, 60, 4, 0.5);
+  SceneOptions options = SceneOf(6, 60, 4, 0.5, 3);
   options.start_point_noise = 0.002;
-  options.random_seed = 3;
   return options;
 }
 

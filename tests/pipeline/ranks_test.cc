@@ -18,6 +18,7 @@
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 #include "tests/pipeline/solve_by_ranks.h"
+#include "tests/testing/model_matchers.h"
 #include "tests/testing/thread_ranks.h"
 
 namespace krot::internal {
@@ -77,13 +78,8 @@ TEST(SolveByRanks, RefusesWhatIsForOneProcess) {
   const Model whole = SynthesizeScene(SceneToShare()).model;
   SolveModelOptions options;
   options.init = SolveInit::kFeasible;
-  try {
-    SolveByRanks(whole, options, 2);
-    FAIL();
-  } catch (const RanksError& error) {
-    EXPECT_STREQ(error.what(),
-                 "a start from nothing is for one process: use krot solver");
-  }
+  EXPECT_EQ(MessageOf<RanksError>([&] { SolveByRanks(whole, options, 2); }),
+            "a start from nothing is for one process: use krot solver");
 }
 
 int64_t NumObservations(const Model& model,

@@ -16,6 +16,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/pipeline/solve_by_ranks.h"
+#include "tests/testing/edit_model.h"
 #include "tests/testing/scene_of.h"
 
 namespace krot::internal {
@@ -59,21 +60,10 @@ std::vector<Point2D*> Seen(int image, Model* model) {
   return seen;
 }
 
-// Takes all but `count` of an image's observations away.
-void KeepFew(int image, size_t count, Model* model) {
-  std::vector<char> is_removed;
-  size_t kept = 0;
-  for (const TrackElement& element : model->track_elements) {
-    const bool is_of_image = element.image_id == model->images[image].id;
-    is_removed.push_back(is_of_image && ++kept > count);
-  }
-  *model = RemoveObservations(*model, is_removed).model;
-}
-
 // As of an image that was matched wrongly: its few observations lie on one
 // another, so that it is the better the farther away it stands.
 Model WithRunaway(Model model, int image, const Vector3d& centre) {
-  KeepFew(image, 4, &model);
+  model = WithFewObservationsOf(image, 4, model);
   double offset = 0;
   for (Point2D* point : Seen(image, &model)) {
     point->x = 0.5 * static_cast<double>(model.cameras[0].width) + offset;
@@ -191,7 +181,7 @@ TEST(SettleEstimate, NamesACameraThatComesBack) {
 
 TEST(SettleEstimate, NamesACameraWithASingleRay) {
   Model model = Scene();
-  KeepFew(7, 1, &model);
+  model = WithFewObservationsOf(7, 1, model);
   const SolveModelResult result = SolveModel(model, {});
   ASSERT_EQ(result.summary.loose.images.size(), 1);
   EXPECT_EQ(result.summary.loose.images[0].image_id, model.images[7].id);

@@ -2,8 +2,12 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "krot/report/reports.h"
 
 namespace krot::internal {
 namespace {
@@ -39,6 +43,27 @@ TEST(FormatBytes, ChoosesTheUnit) {
   EXPECT_EQ(FormatBytes(999950), "1.0 MB");
   EXPECT_EQ(FormatBytes(2000000000000), "2.0 TB");
   EXPECT_EQ(FormatBytes(5000000000000000), "5000.0 TB");
+}
+
+std::string TableOfLength(double low, double high) {
+  ToleranceReport report;
+  ToleranceLength length;
+  length.name = "a.jpg to b.jpg";
+  length.length = low;
+  length.low = {low, low};
+  length.high = {high, high};
+  report.summary.lengths.push_back(length);
+  return ToleranceTable(report, 10);
+}
+
+TEST(ToleranceTable, RoundsProvedEndsOutwards) {
+  EXPECT_THAT(TableOfLength(1.23456789, 1.23456712),
+              ::testing::ContainsRegex("1\\.23456 +1\\.23457 "));
+}
+
+TEST(ToleranceTable, LeavesShortNumbersAsTheyAre) {
+  EXPECT_THAT(TableOfLength(49.99, 50.01),
+              ::testing::ContainsRegex("49\\.99 +50\\.01 "));
 }
 
 }  // namespace

@@ -19,11 +19,10 @@ constexpr double kMetres = 50;
 
 struct MeasuredScene {
   MeasuredScene(uint64_t seed, int sensors_per_rig, int camera_model_id = 1) {
-    SceneOptions options = SceneOf(6, 40, 4, 0.5);
+    SceneOptions options = SceneOf(6, 40, 4, 0.5, seed);
     options.camera_model_id = camera_model_id;
     options.has_rigs = sensors_per_rig > 1;
     options.sensors_per_rig = sensors_per_rig;
-    options.random_seed = seed;
     const SyntheticScene scene = SynthesizeScene(options);
     model = scene.model;
     truth = scene.ground_truth;

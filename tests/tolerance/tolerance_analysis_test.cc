@@ -13,6 +13,7 @@
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/lp_oracle.h"
+#include "tests/testing/edit_model.h"
 #include "tests/testing/scene_of.h"
 
 namespace krot::internal {
@@ -21,9 +22,8 @@ namespace {
 using Eigen::Vector3d;
 
 SceneOptions SmallNoisyScene(uint64_t seed, int camera_model_id) {
-  SceneOptions options = SceneOf(6, 40, 4, 0.5);
+  SceneOptions options = SceneOf(6, 40, 4, 0.5, seed);
   options.camera_model_id = camera_model_id;
-  options.random_seed = seed;
   return options;
 }
 
@@ -260,12 +260,8 @@ TEST(AnalyzeTolerances, HasTheSameBitsAtAnyNumberOfThreads) {
   const Model model = SynthesizeScene(SmallNoisyScene(9, 4)).model;
   const ToleranceOptions options =
       AskFor(model, 1.2 * LargestErrorOf(model), 2);
-  Context one;
-  one.num_threads = 1;
-  Context three;
-  three.num_threads = 3;
-  const ToleranceResult a = AnalyzeTolerances(model, options, one);
-  const ToleranceResult b = AnalyzeTolerances(model, options, three);
+  const ToleranceResult a = AnalyzeTolerances(model, options, {1});
+  const ToleranceResult b = AnalyzeTolerances(model, options, {3});
   for (size_t n = 0; n < a.summary.boxes.size(); ++n) {
     for (int axis = 0; axis < 3; ++axis) {
       const PositionBox& box_a = a.summary.boxes[n].box;
@@ -292,21 +288,10 @@ TEST(AnalyzeTolerances, HasNoEndBehindAPointThatMayBeInfinitelyFarAway) {
   EXPECT_LT(num_ends, 6);
 }
 
-// A copy in which an image has one observation only.
-Model WithOneObservation(const Model& model, size_t image) {
-  std::vector<char> is_removed(model.track_elements.size(), 0);
-  int64_t num_seen = 0;
-  for (size_t e = 0; e < model.track_elements.size(); ++e) {
-    if (model.track_elements[e].image_id != model.images[image].id) continue;
-    is_removed[e] = ++num_seen > 1;
-  }
-  return RemoveObservations(model, is_removed).model;
-}
-
 TEST(AnalyzeTolerances, IsOpenOnlyForAFrameThatMayBeInfinitelyFarAway) {
   for (const size_t image : {0, 3}) {
-    const Model model =
-        WithOneObservation(SynthesizeScene(SmallNoisyScene(3, 1)).model, image);
+    const Model model = WithFewObservationsOf(
+        image, 1, SynthesizeScene(SmallNoisyScene(3, 1)).model);
     const ToleranceResult result =
         AnalyzeTolerances(model, AskFor(model, 3, 0));
     ASSERT_EQ(result.summary.termination, ToleranceTermination::kDone);

@@ -8,7 +8,6 @@
 #include <Eigen/Core>
 
 #include "krot/analysis/pose_rows.h"
-#include "krot/analysis/shared_columns.h"
 #include "krot/base/numbers.h"
 #include "krot/geometry/transform.h"
 #include "krot/linear/reduced_camera_system.h"
@@ -31,8 +30,193 @@ using Matrix26 = Eigen::Matrix<double, 2, 6>;
 // (its principal point, which was held), and 0.04 where it took several.
 constexpr double kLeastGain = 0.1;
 constexpr double kLeastGainOfOneImage = 0.2;
-// Eigenvalues of a matrix with ones on its diagonal: less is not determined.
-constexpr double kUndetermined = 1e-9;
+
+// What the columns of cameras gain, the points and the poses eliminated: D =
+// C'C and g = C'e.
+struct GainSystem {
+  explicit GainSystem(Index size)
+      : D(MatrixXd::Zero(size, size)), g(VectorXd::Zero(size)) {}
+
+  VectorXd StepOf(const SharedGroup& group) const {
+    return DeterminedStep<VectorXd>(
+        D.block(group.begin, group.begin, group.size, group.size),
+        g.segment(group.begin, group.size));
+  }
+  double GainOf(const SharedGroup& group) const {
+    return group.size == 0 || g.size() == 0
+               ? 0
+               : -g.segment(group.begin, group.size).dot(StepOf(group));
+  }
+
+  // Frees the group's columns: what is left is the gain beside it.
+  void Free(const SharedGroup& group) {
+    if (group.size == 0) return;
+    const MatrixXd rows = D.middleRows(group.begin, group.size);
+    const MatrixXd own = rows.middleCols(group.begin, group.size);
+    MatrixXd steps(group.size, g.size());
+    for (Index c = 0; c < g.size(); ++c) {
+      steps.col(c) = DeterminedStep<VectorXd>(own, rows.col(c));
+    }
+    g += rows.transpose() *
+         DeterminedStep<VectorXd>(own, g.segment(group.begin, group.size));
+    D += rows.transpose() * steps;
+  }
+
+  MatrixXd D;
+  VectorXd g;
+};
+
+Matrix3d RootOf(const std::vector<PoseRow>& rows) {
+  Matrix3d H = Matrix3d::Zero();
+  for (const PoseRow& row : rows) {
+    H.noalias() += row.F.rightCols<3>().transpose() * row.F.rightCols<3>();
+  }
+  return RootOfInverse(H);
+}
+
+// Eliminates the points and then the poses of frames from the normal equations
+// with the columns of cameras.
+class PoseElimination {
+ public:
+  // Keeps references. `length` is the unit in which centres move.
+  PoseElimination(const Model& model, const PoseRows& rows,
+                  const SharedColumns& shared, double length)
+      : model_(model),
+        rows_(rows),
+        shared_(shared),
+        length_(length),
+        num_columns_(shared.num_columns()),
+        of_cameras_(num_columns_) {}
+
+  // Without columns if the poses cannot be eliminated.
+  GainSystem Run(int num_threads) {
+    BlockStructure structure;
+    structure.point_begin = {0};
+    std::vector<std::vector<PoseRow>> tracks;
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      std::vector<PoseRow> rows = rows_.Of(k);
+      if (rows.empty()) continue;
+      for (const PoseRow& row : rows) {
+        const int32_t frame = FrameOf(row);
+        structure.frame_of.push_back(2 * frame);
+        structure.frame_of.push_back(2 * frame + 1);
+      }
+      structure.point_begin.push_back(
+          static_cast<int64_t>(structure.frame_of.size()));
+      tracks.push_back(std::move(rows));
+    }
+    structure.frame_is_fixed.assign(2 * model_.frames.size(), 1);
+    for (const int32_t f : structure.frame_of) structure.frame_is_fixed[f] = 0;
+    ReducedCameraSystem system(structure);
+    system.SetZero();
+    T_ = MatrixXd::Zero(system.num_columns(), num_columns_ + 1);
+    for (const std::vector<PoseRow>& rows : tracks) AddTrack(rows, &system);
+    if (!system.Factorize(num_threads)) return GainSystem(0);
+    MatrixXd X(T_.rows(), T_.cols());
+    for (Index c = 0; c < T_.cols(); ++c) {
+      X.col(c) = system.Solve(T_.col(c), 1e-8);
+    }
+    const auto T = T_.leftCols(num_columns_);
+    of_cameras_.D -= T.transpose() * X.leftCols(num_columns_);
+    of_cameras_.g -= T.transpose() * X.col(num_columns_);
+    of_cameras_.D = (of_cameras_.D + of_cameras_.D.transpose()).eval() / 2;
+    return std::move(of_cameras_);
+  }
+
+ private:
+  // By the frame's turn about its centre and by that, in units of length.
+  Matrix26 ByFrame(const PoseRow& row) const {
+    const ImageGeometry& geometry = rows_.geometries()[row.image];
+    const Vector3d center = Center(geometry.cam_from_rig);
+    const Matrix3d world_from_rig =
+        geometry.rig_from_world.rotation.transpose();
+    Matrix26 F;
+    F << row.F.leftCols<3>() * geometry.cam_from_rig.rotation +
+             row.F.rightCols<3>() * world_from_rig * CrossMatrix(center),
+        row.F.rightCols<3>() * length_;
+    return F;
+  }
+
+  int32_t FrameOf(const PoseRow& row) const {
+    return rows_.geometries()[row.image].frame;
+  }
+
+  void AddTrack(const std::vector<PoseRow>& rows, ReducedCameraSystem* system) {
+    const std::vector<SharedGroup>& groups = shared_.groups();
+    MatrixXd& D = of_cameras_.D;
+    VectorXd& g = of_cameras_.g;
+    const Matrix3d root = RootOf(rows);
+    std::vector<int32_t> nodes;
+    for (const PoseRow& row : rows) {
+      nodes.push_back(2 * FrameOf(row));
+      nodes.push_back(2 * FrameOf(row) + 1);
+    }
+    SortUnique(&nodes);
+    // Rows of G are contiguous.
+    Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> G(
+        3, 3 * static_cast<Index>(nodes.size()));
+    G.setZero();
+    std::map<int32_t, MatrixXd> G_of;
+    Vector3d G_e = Vector3d::Zero();
+    for (const PoseRow& row : rows) {
+      const int32_t node = 2 * FrameOf(row);
+      const Matrix23 Q = row.F.rightCols<3>() * root;
+      const Matrix26 F = ByFrame(row);
+      const Index slot =
+          3 *
+          (std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin());
+      G.middleCols<6>(slot) += Q.transpose() * F;
+      G_e += Q.transpose() * row.error;
+      for (const auto& [a, b] : {std::pair(0, 0), {1, 0}, {1, 1}}) {
+        const Matrix3d block = F.middleCols<3>(Index{3} * a).transpose() *
+                               F.middleCols<3>(Index{3} * b);
+        system->AddBlock(0, node + a, node + b, block.data());
+      }
+      const Index column = system->column(node);
+      T_.block<6, 1>(column, num_columns_) += F.transpose() * row.error;
+      const std::vector<ByGroup> all = shared_.ByGroups(row);
+      for (const auto& [n, C] : all) {
+        const SharedGroup& group = groups[n];
+        T_.block(column, group.begin, 6, group.size) += F.transpose() * C;
+        g.segment(group.begin, group.size) += C.transpose() * row.error;
+        G_of.try_emplace(n, MatrixXd::Zero(3, group.size)).first->second +=
+            Q.transpose() * C;
+        for (const auto& [m, other] : all) {
+          D.block(group.begin, groups[m].begin, group.size, groups[m].size) +=
+              C.transpose() * other;
+        }
+      }
+    }
+    const double* const rows_of_G[3] = {G.row(0).data(), G.row(1).data(),
+                                        G.row(2).data()};
+    system->SubtractSquare(0, nodes, std::vector<char>(nodes.size(), 0),
+                           rows_of_G);
+    for (size_t a = 0; a < nodes.size(); ++a) {
+      const Eigen::Matrix3d G_a = G.middleCols<3>(static_cast<Index>(3 * a));
+      const Index column = system->column(nodes[a]);
+      T_.block<3, 1>(column, num_columns_) -= G_a.transpose() * G_e;
+      for (const auto& [n, G_n] : G_of) {
+        T_.block(column, groups[n].begin, 3, groups[n].size) -=
+            G_a.transpose() * G_n;
+      }
+    }
+    for (const auto& [n, G_n] : G_of) {
+      g.segment(groups[n].begin, groups[n].size) -= G_n.transpose() * G_e;
+      for (const auto& [m, G_m] : G_of) {
+        D.block(groups[n].begin, groups[m].begin, groups[n].size,
+                groups[m].size) -= G_n.transpose() * G_m;
+      }
+    }
+  }
+
+  const Model& model_;
+  const PoseRows& rows_;
+  const SharedColumns& shared_;
+  const double length_;
+  const Index num_columns_;
+  MatrixXd T_;  // F'C and F'e, its last column
+  GainSystem of_cameras_;
+};
 
 class CameraChecker {
  public:
@@ -51,7 +235,8 @@ class CameraChecker {
 
   std::vector<WrongCamera> Run() {
     if (!DropUnsuspected()) return {};
-    Reduce();
+    GainSystem system =
+        PoseElimination(model_, rows_, shared_, length_).Run(num_threads_);
     std::vector<WrongCamera> wrong;
     std::vector<char> is_free(Groups().size(), 0);
     for (;;) {
@@ -60,19 +245,19 @@ class CameraChecker {
       for (size_t i = 0; i < Groups().size(); ++i) {
         if (is_free[i]) continue;
         const SharedGroup& group = Groups()[i];
-        const double gain = GainOf(group);
+        const double gain = system.GainOf(group);
         if (gain <= most || !IsWrong(gain, group)) continue;
         best = &group;
         most = gain;
       }
       if (best == nullptr) return wrong;
-      wrong.push_back(Describe(*best, most));
+      wrong.push_back(Describe(*best, most, system.StepOf(*best)));
       for (size_t i = 0; i < Groups().size(); ++i) {
         // All parameters of a lens take part in the same fault.
         const bool is_same =
             Groups()[i].camera == best->camera && Groups()[i].rig == best->rig;
         if (is_free[i] || !is_same) continue;
-        Eliminate(Groups()[i]);
+        system.Free(Groups()[i]);
         is_free[i] = 1;
       }
     }
@@ -91,27 +276,6 @@ class CameraChecker {
   double ExponentOf(double gain, const SharedGroup& group) const {
     return GainExponent(gain, group.square, group.num_directions,
                         static_cast<int>(group.size), *noise_.sigma_px);
-  }
-
-  // By the frame's turn about its centre and by that, in units of length.
-  Matrix26 ByFrame(const PoseRow& row) const {
-    const ImageGeometry& geometry = rows_.geometries()[row.image];
-    const Vector3d center = Center(geometry.cam_from_rig);
-    const Matrix3d world_from_rig =
-        geometry.rig_from_world.rotation.transpose();
-    Matrix26 F;
-    F << row.F.leftCols<3>() * geometry.cam_from_rig.rotation +
-             row.F.rightCols<3>() * world_from_rig * CrossMatrix(center),
-        row.F.rightCols<3>() * length_;
-    return F;
-  }
-
-  static Matrix3d RootOf(const std::vector<PoseRow>& rows) {
-    Matrix3d H = Matrix3d::Zero();
-    for (const PoseRow& row : rows) {
-      H.noalias() += row.F.rightCols<3>().transpose() * row.F.rightCols<3>();
-    }
-    return RootOfInverse(H);
   }
 
   // Groups that gain too little with the poses held lose their columns. False
@@ -146,171 +310,21 @@ class CameraChecker {
     length_ = LowerMedian(std::move(lengths));
     std::vector<char> is_suspected;
     for (size_t n = 0; n < Groups().size(); ++n) {
-      is_suspected.push_back(ExponentOf(GainOf(D[n], g[n]), Groups()[n]) >
-                             least_exponent_);
+      const double gain = -g[n].dot(DeterminedStep(D[n], g[n]));
+      is_suspected.push_back(ExponentOf(gain, Groups()[n]) > least_exponent_);
     }
     shared_.Keep(is_suspected);
-    num_columns_ = shared_.num_columns();
-    return num_columns_ > 0;
+    return shared_.num_columns() > 0;
   }
 
-  void Reduce() {
-    BlockStructure structure;
-    structure.point_begin = {0};
-    std::vector<std::vector<PoseRow>> tracks;
-    for (size_t k = 0; k < model_.points3D.size(); ++k) {
-      std::vector<PoseRow> rows = rows_.Of(k);
-      if (rows.empty()) continue;
-      for (const PoseRow& row : rows) {
-        const int32_t frame = FrameOf(row);
-        structure.frame_of.push_back(2 * frame);
-        structure.frame_of.push_back(2 * frame + 1);
-      }
-      structure.point_begin.push_back(
-          static_cast<int64_t>(structure.frame_of.size()));
-      tracks.push_back(std::move(rows));
-    }
-    structure.frame_is_fixed.assign(2 * model_.frames.size(), 1);
-    for (const int32_t f : structure.frame_of) structure.frame_is_fixed[f] = 0;
-    ReducedCameraSystem system(structure);
-    system.SetZero();
-    T_ = MatrixXd::Zero(system.num_columns(), num_columns_ + 1);
-    D_ = MatrixXd::Zero(num_columns_, num_columns_);
-    g_ = VectorXd::Zero(num_columns_);
-    for (const std::vector<PoseRow>& rows : tracks) AddTrack(rows, &system);
-    if (!system.Factorize(num_threads_)) {
-      num_columns_ = 0;
-      return;
-    }
-    MatrixXd X(T_.rows(), T_.cols());
-    for (Index c = 0; c < T_.cols(); ++c) {
-      X.col(c) = system.Solve(T_.col(c), 1e-8);
-    }
-    const auto T = T_.leftCols(num_columns_);
-    D_ -= T.transpose() * X.leftCols(num_columns_);
-    g_ -= T.transpose() * X.col(num_columns_);
-    D_ = (D_ + D_.transpose()).eval() / 2;
-  }
-
-  int32_t FrameOf(const PoseRow& row) const {
-    return rows_.geometries()[row.image].frame;
-  }
-
-  void AddTrack(const std::vector<PoseRow>& rows, ReducedCameraSystem* system) {
-    const Matrix3d root = RootOf(rows);
-    std::vector<int32_t> nodes;
-    for (const PoseRow& row : rows) {
-      nodes.push_back(2 * FrameOf(row));
-      nodes.push_back(2 * FrameOf(row) + 1);
-    }
-    SortUnique(&nodes);
-    // Rows of G are contiguous.
-    Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> G(
-        3, 3 * static_cast<Index>(nodes.size()));
-    G.setZero();
-    std::map<int32_t, MatrixXd> G_of;
-    Vector3d G_e = Vector3d::Zero();
-    for (const PoseRow& row : rows) {
-      const int32_t node = 2 * FrameOf(row);
-      const Matrix23 Q = row.F.rightCols<3>() * root;
-      const Matrix26 F = ByFrame(row);
-      const Index slot =
-          3 *
-          (std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin());
-      G.middleCols<6>(slot) += Q.transpose() * F;
-      G_e += Q.transpose() * row.error;
-      for (const auto& [a, b] : {std::pair(0, 0), {1, 0}, {1, 1}}) {
-        const Matrix3d block = F.middleCols<3>(Index{3} * a).transpose() *
-                               F.middleCols<3>(Index{3} * b);
-        system->AddBlock(0, node + a, node + b, block.data());
-      }
-      const Index column = system->column(node);
-      T_.block<6, 1>(column, num_columns_) += F.transpose() * row.error;
-      const std::vector<ByGroup> all = shared_.ByGroups(row);
-      for (const auto& [n, C] : all) {
-        const SharedGroup& group = Groups()[n];
-        T_.block(column, group.begin, 6, group.size) += F.transpose() * C;
-        g_.segment(group.begin, group.size) += C.transpose() * row.error;
-        G_of.try_emplace(n, MatrixXd::Zero(3, group.size)).first->second +=
-            Q.transpose() * C;
-        for (const auto& [m, other] : all) {
-          D_.block(group.begin, Groups()[m].begin, group.size,
-                   Groups()[m].size) += C.transpose() * other;
-        }
-      }
-    }
-    const double* const rows_of_G[3] = {G.row(0).data(), G.row(1).data(),
-                                        G.row(2).data()};
-    system->SubtractSquare(0, nodes, std::vector<char>(nodes.size(), 0),
-                           rows_of_G);
-    for (size_t a = 0; a < nodes.size(); ++a) {
-      const Eigen::Matrix3d G_a = G.middleCols<3>(static_cast<Index>(3 * a));
-      const Index column = system->column(nodes[a]);
-      T_.block<3, 1>(column, num_columns_) -= G_a.transpose() * G_e;
-      for (const auto& [n, G_n] : G_of) {
-        T_.block(column, Groups()[n].begin, 3, Groups()[n].size) -=
-            G_a.transpose() * G_n;
-      }
-    }
-    for (const auto& [n, G_n] : G_of) {
-      g_.segment(Groups()[n].begin, Groups()[n].size) -= G_n.transpose() * G_e;
-      for (const auto& [m, G_m] : G_of) {
-        D_.block(Groups()[n].begin, Groups()[m].begin, Groups()[n].size,
-                 Groups()[m].size) -= G_n.transpose() * G_m;
-      }
-    }
-  }
-
-  // D^+ g in the directions that are determined.
-  static VectorXd StepOf(const MatrixXd& D, const VectorXd& g) {
-    VectorXd scale = D.diagonal().cwiseMax(0).cwiseSqrt();
-    for (double& s : scale) s = s > 0 ? 1 / s : 0;
-    const Eigenpairs of_D =
-        EigenpairsOf(scale.asDiagonal() * D * scale.asDiagonal());
-    VectorXd y = of_D.vectors.transpose() * scale.cwiseProduct(g);
-    for (Index j = 0; j < y.size(); ++j) {
-      const double value = of_D.values[j];
-      y[j] = value > kUndetermined ? -y[j] / value : 0;
-    }
-    return scale.cwiseProduct(of_D.vectors * y);
-  }
-
-  static double GainOf(const MatrixXd& D, const VectorXd& g) {
-    return D.size() == 0 ? 0 : -g.dot(StepOf(D, g));
-  }
-
-  VectorXd StepOf(const SharedGroup& group) const {
-    return StepOf(D_.block(group.begin, group.begin, group.size, group.size),
-                  g_.segment(group.begin, group.size));
-  }
-  double GainOf(const SharedGroup& group) const {
-    return group.size == 0 || num_columns_ == 0
-               ? 0
-               : -g_.segment(group.begin, group.size).dot(StepOf(group));
-  }
-
-  // Frees the group's columns: what is left is the gain beside it.
-  void Eliminate(const SharedGroup& group) {
-    if (group.size == 0) return;
-    const MatrixXd rows = D_.middleRows(group.begin, group.size);
-    MatrixXd solved(group.size, num_columns_ + 1);
-    const MatrixXd D = rows.middleCols(group.begin, group.size);
-    for (Index c = 0; c < num_columns_; ++c) {
-      solved.col(c) = -StepOf(D, rows.col(c));
-    }
-    solved.col(num_columns_) = -StepOf(D, g_.segment(group.begin, group.size));
-    g_ -= rows.transpose() * solved.col(num_columns_);
-    D_ -= rows.transpose() * solved.leftCols(num_columns_);
-  }
-
-  WrongCamera Describe(const SharedGroup& group, double gain) const {
+  WrongCamera Describe(const SharedGroup& group, double gain,
+                       const VectorXd& step) const {
     const Camera& camera = model_.cameras[group.camera];
     WrongCamera wrong;
     wrong.camera_id = camera.id;
     wrong.fault = group.fault;
     wrong.gain = std::min(1.0, gain / group.square);
     wrong.num_images = group.num_images;
-    const VectorXd step = StepOf(group);
     switch (group.fault) {
       case CameraFault::kFocalLength:
         for (Index i = 0; i < group.size; ++i) {
@@ -339,13 +353,8 @@ class CameraChecker {
   SharedColumns shared_;
   const int least_num_images_;
   const int num_threads_;
-  Index num_columns_ = 0;
   double least_exponent_ = 0;
   double length_ = 1;  // the median distance of a point from a camera
-  // The system without the points: T = F'C and its last column F'e, D = C'C and
-  // g = C'e; without the poses, too, once Reduce is done.
-  MatrixXd T_, D_;
-  VectorXd g_;
 };
 
 }  // namespace

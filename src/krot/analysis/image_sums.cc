@@ -44,22 +44,6 @@ void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
   }
 }
 
-// Finds the step. As rotations and centres have different units, the diagonal
-// is scaled to 1 first. Nothing holds directions whose eigenvalues are below
-// 1e-9 then.
-void Solve(ImageSums* sums) {
-  Vector6 scale = sums->M.diagonal().cwiseSqrt();
-  for (double& s : scale) s = s > 0 ? 1 / s : 0;
-  const Eigenpairs of_M =
-      EigenpairsOf(scale.asDiagonal() * sums->M * scale.asDiagonal());
-  Vector6 y = of_M.vectors.transpose() * scale.cwiseProduct(sums->g);
-  for (int j = 0; j < 6; ++j) {
-    const double value = of_M.values[j];
-    y[j] = value > 1e-9 ? -y[j] / value : 0;
-  }
-  sums->step = scale.cwiseProduct(of_M.vectors * y);
-}
-
 // 1 / sqrt of the smallest eigenvalue of A - B C^-1 B'; infinite if nothing
 // holds.
 double LargestSpread(const Matrix3d& A, const Matrix3d& B, const Matrix3d& C) {
@@ -229,7 +213,9 @@ std::vector<ImageSums> AddUpImages(const Model& model,
       Add(row, R, &sums[row.image]);
     }
   }
-  for (ImageSums& of_image : sums) Solve(&of_image);
+  for (ImageSums& of_image : sums) {
+    of_image.step = DeterminedStep(of_image.M, of_image.g);
+  }
   return sums;
 }
 

@@ -43,56 +43,17 @@ Vector3d MeanOf(const std::vector<Vector3d>& places) {
   return mean / static_cast<double>(std::max<size_t>(1, places.size()));
 }
 
-class PartFinder {
+// A maximum spanning forest of the frames, joined by the tracks that they
+// share.
+class FrameForest {
  public:
-  PartFinder(const Model& model, const ModelNoise& noise)
+  // Keeps references.
+  FrameForest(const Model& model, const ModelNoise& noise,
+              const std::vector<ImageGeometry>& geometries)
       : model_(model),
         noise_(noise),
-        geometries_(ImageGeometries(model)),
+        geometries_(geometries),
         image_of_(ImagesOfElements(model)) {
-    std::vector<Vector3d> centers;
-    for (const ImageGeometry& geometry : geometries_) {
-      if (geometry.has_pose) centers.push_back(Center(geometry.cam_from_world));
-    }
-    const Vector3d middle = MeanOf(centers);
-    double sum = 0;
-    for (const Vector3d& center : centers) {
-      sum += (center - middle).squaredNorm();
-    }
-    radius_ = std::sqrt(sum / static_cast<double>(centers.size()));
-  }
-
-  std::vector<ModelPart> Run() {
-    Span();
-    std::vector<ModelPart> parts = Separate();
-    for (size_t cut = 0; cut < tree_.size(); ++cut) {
-      const std::vector<char> is_part = SmallerSide(cut);
-      if (NumFrames(is_part) < 2 || IsWellTied(is_part, tree_[cut])) continue;
-      ModelPart part = PartOf(is_part);
-      if (part.relative_center_sigma > kWeakSigma) {
-        parts.push_back(std::move(part));
-      }
-    }
-    std::stable_sort(parts.begin(), parts.end(),
-                     [](const ModelPart& a, const ModelPart& b) {
-                       return a.images.size() > b.images.size();
-                     });
-    return parts;
-  }
-
- private:
-  // visit(element, frame) for each observation of point k that is tested.
-  template <typename Visit>
-  void ForEachTested(size_t k, const Visit& visit) const {
-    const Point3D& point = model_.points3D[k];
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      if (noise_.observations[e].num_controlled == 0) continue;
-      visit(e, geometries_[image_of_[e]].frame);
-    }
-  }
-
-  // Finds the tracks of frames, and a maximum spanning forest of the frames.
-  void Span() {
     const auto num_frames = static_cast<int32_t>(model_.frames.size());
     tracks_of_.resize(num_frames);
     for (size_t k = 0; k < model_.points3D.size(); ++k) {
@@ -120,7 +81,7 @@ class PartFinder {
     for (const Link& link : links) {
       if (joined.Find(link.a) == joined.Find(link.b)) continue;
       joined.Unite(link.a, link.b);
-      tree_.push_back(link);
+      links_.push_back(link);
     }
     for (int32_t f = 0; f < num_frames; ++f) {
       component_of_.push_back(
@@ -128,15 +89,66 @@ class PartFinder {
     }
   }
 
-  int64_t NumFrames(const std::vector<char>& is_part) const {
+  // visit(element, frame) for each observation of point k that is tested.
+  template <typename Visit>
+  void ForEachTested(size_t k, const Visit& visit) const {
+    const Point3D& point = model_.points3D[k];
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      if (noise_.observations[e].num_controlled == 0) continue;
+      visit(e, geometries_[image_of_[e]].frame);
+    }
+  }
+
+  int32_t image_of(uint64_t e) const { return image_of_[e]; }
+  bool HasTracks(int32_t frame) const { return component_of_[frame] >= 0; }
+  size_t num_links() const { return links_.size(); }
+
+  static int64_t NumFrames(const std::vector<char>& is_part) {
     return std::count(is_part.begin(), is_part.end(), 1);
+  }
+
+  // The trees, those with the most frames first.
+  std::vector<std::vector<char>> Trees() const {
+    std::vector<std::pair<int64_t, std::vector<char>>> all;
+    for (size_t f = 0; f < component_of_.size(); ++f) {
+      const auto root = static_cast<int32_t>(f);
+      if (component_of_[f] != root) continue;
+      std::vector<char> is_part;
+      for (const int32_t other : component_of_) {
+        is_part.push_back(other == root ? 1 : 0);
+      }
+      const int64_t count = NumFrames(is_part);
+      all.emplace_back(count, std::move(is_part));
+    }
+    SortLargestFirst(&all, &std::pair<int64_t, std::vector<char>>::first);
+    std::vector<std::vector<char>> trees;
+    for (auto& [count, is_part] : all) trees.push_back(std::move(is_part));
+    return trees;
+  }
+
+  // The frames on the side of a link with fewer of them.
+  std::vector<char> SmallerSide(size_t cut) const {
+    DisjointSets sets(static_cast<int64_t>(component_of_.size()));
+    for (size_t n = 0; n < links_.size(); ++n) {
+      if (n != cut) sets.Unite(links_[n].a, links_[n].b);
+    }
+    const auto side = [&](int32_t of) {
+      std::vector<char> is_part;
+      const int64_t root = sets.Find(of);
+      for (size_t f = 0; f < component_of_.size(); ++f) {
+        is_part.push_back(sets.Find(static_cast<int64_t>(f)) == root ? 1 : 0);
+      }
+      return is_part;
+    };
+    std::vector<char> a = side(links_[cut].a), b = side(links_[cut].b);
+    return NumFrames(b) <= NumFrames(a) ? b : a;
   }
 
   // Whether so many tracks compare the sides that they hold both; looks at
   // those of the two frames that share most.
-  bool IsWellTied(const std::vector<char>& is_part, const Link& link) const {
+  bool IsWellTied(const std::vector<char>& is_part, size_t cut) const {
     int64_t count = 0;
-    for (const size_t k : tracks_of_[link.a]) {
+    for (const size_t k : tracks_of_[links_[cut].a]) {
       int32_t first[2] = {-1, -1};
       bool is_located[2] = {false, false};
       ForEachTested(k, [&](uint64_t, int32_t frame) {
@@ -150,49 +162,62 @@ class PartFinder {
     return false;
   }
 
-  // The components, but for the one with the most frames: nothing holds them.
-  std::vector<ModelPart> Separate() const {
-    std::vector<std::pair<int64_t, std::vector<char>>> all;
-    for (size_t f = 0; f < component_of_.size(); ++f) {
-      const auto root = static_cast<int32_t>(f);
-      if (component_of_[f] != root) continue;
-      std::vector<char> is_part;
-      for (const int32_t other : component_of_) {
-        is_part.push_back(other == root ? 1 : 0);
-      }
-      const int64_t count = NumFrames(is_part);
-      all.emplace_back(count, std::move(is_part));
+ private:
+  const Model& model_;
+  const ModelNoise& noise_;
+  const std::vector<ImageGeometry>& geometries_;
+  const std::vector<int32_t> image_of_;         // by track element
+  std::vector<std::vector<size_t>> tracks_of_;  // by frame
+  std::vector<Link> links_;                     // of the forest
+  std::vector<int32_t> component_of_;           // by frame; -1: without tracks
+};
+
+class PartFinder {
+ public:
+  PartFinder(const Model& model, const ModelNoise& noise)
+      : model_(model),
+        noise_(noise),
+        geometries_(ImageGeometries(model)),
+        forest_(model, noise, geometries_) {
+    std::vector<Vector3d> centers;
+    for (const ImageGeometry& geometry : geometries_) {
+      if (geometry.has_pose) centers.push_back(Center(geometry.cam_from_world));
     }
-    SortLargestFirst(&all, &std::pair<int64_t, std::vector<char>>::first);
+    const Vector3d middle = MeanOf(centers);
+    double sum = 0;
+    for (const Vector3d& center : centers) {
+      sum += (center - middle).squaredNorm();
+    }
+    radius_ = std::sqrt(sum / static_cast<double>(centers.size()));
+  }
+
+  std::vector<ModelPart> Run() {
     std::vector<ModelPart> parts;
-    for (size_t n = 1; n < all.size(); ++n) {
+    const std::vector<std::vector<char>> trees = forest_.Trees();
+    for (size_t n = 1; n < trees.size(); ++n) {  // nothing holds them
       ModelPart& part = parts.emplace_back();
-      part.images = ImagesOf(all[n].second);
+      part.images = ImagesOf(trees[n]);
       part.center_sigma = part.relative_center_sigma = kInfinity;
     }
+    for (size_t cut = 0; cut < forest_.num_links(); ++cut) {
+      const std::vector<char> is_part = forest_.SmallerSide(cut);
+      if (FrameForest::NumFrames(is_part) < 2) continue;
+      if (forest_.IsWellTied(is_part, cut)) continue;
+      ModelPart part = PartOf(is_part);
+      if (part.relative_center_sigma > kWeakSigma) {
+        parts.push_back(std::move(part));
+      }
+    }
+    std::stable_sort(parts.begin(), parts.end(),
+                     [](const ModelPart& a, const ModelPart& b) {
+                       return a.images.size() > b.images.size();
+                     });
     return parts;
   }
 
-  // The frames on the side of a link with fewer of them.
-  std::vector<char> SmallerSide(size_t cut) const {
-    DisjointSets sets(static_cast<int64_t>(component_of_.size()));
-    for (size_t n = 0; n < tree_.size(); ++n) {
-      if (n != cut) sets.Unite(tree_[n].a, tree_[n].b);
-    }
-    const auto side = [&](int32_t of) {
-      std::vector<char> is_part;
-      const int64_t root = sets.Find(of);
-      for (size_t f = 0; f < component_of_.size(); ++f) {
-        is_part.push_back(sets.Find(static_cast<int64_t>(f)) == root ? 1 : 0);
-      }
-      return is_part;
-    };
-    std::vector<char> a = side(tree_[cut].a), b = side(tree_[cut].b);
-    return NumFrames(b) <= NumFrames(a) ? b : a;
-  }
-
+ private:
   bool HasTracks(const ImageGeometry& geometry) const {
-    return geometry.has_pose && component_of_[geometry.frame] >= 0;
+    return geometry.has_pose && forest_.HasTracks(geometry.frame);
   }
 
   std::vector<int32_t> ImagesOf(const std::vector<char>& is_part) const {
@@ -219,7 +244,7 @@ class PartFinder {
 
   // J'J, with J the derivatives of the pixel by its point.
   Matrix3d InformationOf(uint64_t e, size_t k) const {
-    const int32_t n = image_of_[e];
+    const int32_t n = forest_.image_of(e);
     const Point2D& pixel =
         model_.images[n].points2D[model_.track_elements[e].point2D_idx];
     const RigidTransform& pose = geometries_[n].cam_from_world;
@@ -253,13 +278,13 @@ class PartFinder {
     Matrix7 M = Matrix7::Zero(), D = Matrix7::Zero();
     for (size_t k = 0; k < model_.points3D.size(); ++k) {
       bool has[2] = {false, false};
-      ForEachTested(k, [&](uint64_t, int32_t frame) {
+      forest_.ForEachTested(k, [&](uint64_t, int32_t frame) {
         has[static_cast<int>(is_part[frame])] = true;
       });
       if (!has[0] || !has[1]) continue;
       ++part.num_tracks;
       Matrix3d H[2] = {Matrix3d::Zero(), Matrix3d::Zero()};
-      ForEachTested(k, [&](uint64_t e, int32_t frame) {
+      forest_.ForEachTested(k, [&](uint64_t e, int32_t frame) {
         H[static_cast<int>(is_part[frame])] += InformationOf(e, k);
       });
       const Matrix3d root = RootOfInverse(H[0] + H[1]);
@@ -301,11 +326,8 @@ class PartFinder {
   const Model& model_;
   const ModelNoise& noise_;
   const std::vector<ImageGeometry> geometries_;
-  const std::vector<int32_t> image_of_;         // by track element
-  double radius_ = 0;                           // of the cameras, scene units
-  std::vector<std::vector<size_t>> tracks_of_;  // by frame
-  std::vector<Link> tree_;
-  std::vector<int32_t> component_of_;  // by frame; -1: without tracks
+  const FrameForest forest_;
+  double radius_ = 0;  // of the cameras, scene units
 };
 
 }  // namespace

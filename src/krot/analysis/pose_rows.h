@@ -6,6 +6,8 @@
 #include <Eigen/Core>
 
 #include "krot/analysis/noise.h"
+#include "krot/check.h"
+#include "krot/linear/small_matrices.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 
@@ -40,5 +42,78 @@ class PoseRows {
   const std::vector<int32_t> image_of_;  // by track element
   std::vector<double> nearest_;  // distance of a point, by image; scene units
 };
+
+// What images share of a camera, and may be wrong with it: columns of the
+// derivatives that are freed together.
+struct SharedGroup {
+  int32_t camera = 0;  // index in Model::cameras
+  int32_t rig = -1;    // index in Model::rigs, of kPlaceInRig
+  CameraFault fault = CameraFault::kFocalLength;
+  std::vector<int> params;  // indices in Camera::params
+  Eigen::Index begin = 0;   // the first column
+  Eigen::Index size = 0;
+  int64_t num_images = 0;
+  // As in ImageSums, over the camera's images.
+  int64_t num_directions = 0;
+  double square = 0;
+};
+
+// The derivatives of an observation by the columns of a group. No camera model
+// has more parameters.
+struct ByGroup {
+  int32_t group;
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 16> C;
+};
+
+// The focal length, principal point and distortion of every camera with an
+// image plane, and the place of every camera in its rig but for the reference
+// sensor's.
+class SharedColumns {
+ public:
+  // Keeps references. `sums` are AddUpImages of the model.
+  SharedColumns(const Model& model,
+                const std::vector<ImageGeometry>& geometries,
+                const std::vector<ImageSums>& sums);
+
+  const std::vector<SharedGroup>& groups() const { return groups_; }
+  Eigen::Index num_columns() const { return num_columns_; }
+
+  // Leaves only these groups their columns.
+  void Keep(const std::vector<char>& is_kept);
+
+  // By the columns of the groups that have some. A camera in a rig turns about
+  // its centre, which moves in the rig. Derivatives by the lens are
+  // central differences.
+  std::vector<ByGroup> ByGroups(const PoseRow& row) const;
+
+ private:
+  void AddLenses();
+  void AddPlaces();
+  void Number();
+
+  const Model& model_;
+  const std::vector<ImageGeometry>& geometries_;
+  std::vector<SharedGroup> groups_;
+  std::vector<std::vector<int32_t>> groups_of_camera_;
+  std::vector<int32_t> place_of_image_;  // -1: a reference sensor
+  Eigen::Index num_columns_ = 0;
+};
+
+// -M^+ g in the directions that are determined; M is symmetric. As unknowns
+// have different units, its diagonal is scaled to 1 first: nothing determines
+// directions whose eigenvalues are below 1e-9 then.
+template <typename Vector, typename Matrix>
+Vector DeterminedStep(const Matrix& M, const Vector& g) {
+  Vector scale = M.diagonal().cwiseMax(0).cwiseSqrt();
+  for (double& s : scale) s = s > 0 ? 1 / s : 0;
+  const Eigenpairs of_M =
+      EigenpairsOf(scale.asDiagonal() * M * scale.asDiagonal());
+  Vector y = of_M.vectors.transpose() * scale.cwiseProduct(g);
+  for (Eigen::Index j = 0; j < y.size(); ++j) {
+    const double value = of_M.values[j];
+    y[j] = value > 1e-9 ? -y[j] / value : 0;
+  }
+  return scale.cwiseProduct(of_M.vectors * y);
+}
 
 }  // namespace krot::internal

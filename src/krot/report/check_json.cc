@@ -1,4 +1,3 @@
-#include "krot/report/camera_report.h"
 #include "krot/report/pair_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/reports.h"

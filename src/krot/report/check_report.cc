@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "krot/base/numbers.h"
-#include "krot/report/camera_report.h"
 #include "krot/report/pair_report.h"
 #include "krot/report/text_table.h"
 

@@ -141,6 +141,11 @@ std::string SigmaText(double sigma);
 std::string PartsSentence(const ModelCheck& check);
 std::string PartTable(const ModelCheck& check, size_t max_rows);
 nlohmann::ordered_json PartsJson(const ModelCheck& check);
+// What is wrong with cameras that images share, and what to do; requires one at
+// least.
+std::string CamerasSentence(const ModelCheck& check);
+std::string CameraTable(const ModelCheck& check, size_t max_rows);
+nlohmann::ordered_json CamerasJson(const ModelCheck& check);
 
 // What the model still has that no adjustment mends, and what helps: a line for
 // each; "" if there is nothing.
