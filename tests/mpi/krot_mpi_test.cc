@@ -21,7 +21,6 @@ namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
 
 std::string BytesOf(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
