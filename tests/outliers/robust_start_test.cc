@@ -391,6 +391,39 @@ TEST(FindWeakLinks, AreHeldByManyTracksOfTwo) {
   EXPECT_FALSE(all_are_held(torn));
 }
 
+// A group may grow about the only one of its frames that sees the others'
+// points, however many these are.
+TEST(PlaceSearch, KnowsNoScaleAboutASingleFrame) {
+  SceneOptions options = SceneOf(12, 2000, 6);
+  options.camera_model_id = 1;
+  const BuiltProblem built =
+      BuildProblem(SynthesizeScene(options).ground_truth, {});
+  const KnownRotationProblem& problem = built.problem;
+  const auto deviation = [&](int32_t last_of_b) {
+    const std::vector<AffineMap> cameras =
+        CamerasFromWorld(problem, built.start.translations);
+    std::vector<SharedTrack> tracks;
+    for (int32_t k = 0; k < problem.num_points; ++k) {
+      SharedTrack track;
+      for (const int64_t i : problem.OfPoint(k)) {
+        const bool is_of_b = problem.FrameOf(i) <= last_of_b;
+        (is_of_b ? track.b : track.a).observations.push_back(i);
+      }
+      for (Side* side : {&track.a, &track.b}) {
+        side->x = built.start.points[k];
+        side->H = NormalOf(problem, cameras, *side, side->x).H;
+      }
+      if (track.a.observations.empty() || track.b.observations.empty())
+        continue;
+      tracks.push_back(track);
+    }
+    EXPECT_GT(tracks.size(), 100u);
+    return PlaceSearch(problem, built.start, 2, tracks).ScaleDeviation(Place());
+  };
+  EXPECT_LT(deviation(5), 0.1);
+  EXPECT_EQ(deviation(0), INFINITY);
+}
+
 // A fifth of the tracks has no wrong observation.
 TEST(FindWeakLinks, AreHeldWhereAsManyTracksAreWrongElsewhere) {
   int num_links = 0;

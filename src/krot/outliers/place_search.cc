@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -144,9 +145,16 @@ Place PlaceSearch::Improve(const Place& place, bool is_scale_free) const {
 
 double PlaceSearch::ScaleDeviation(const Place& place) const {
   const Matrix4d S = NormalOfPlace(place).first;
-  if (!(S.trace() > 0)) return std::numeric_limits<double>::infinity();
-  const double variance = variance_ * InverseOf<4>(S)(3, 3);
-  return Unit(tracks_).PlaceOf(Vector4d::Unit(3)).scale * std::sqrt(variance);
+  const Vector3d mixed = S.topRightCorner<3, 1>();
+  // What is left of the scale's information, the shift eliminated. Rounding and
+  // InverseOf leave up to some 1e-9 of it where nothing is left.
+  const double information =
+      S(3, 3) - mixed.dot(S.topLeftCorner<3, 3>().ldlt().solve(mixed));
+  if (!(information > 1e-8 * S(3, 3))) {
+    return std::numeric_limits<double>::infinity();
+  }
+  return Unit(tracks_).PlaceOf(Vector4d::Unit(3)).scale *
+         std::sqrt(variance_ / information);
 }
 
 // For every track (t - x_a + scale x_b)' W (...) is to be small, with t the
