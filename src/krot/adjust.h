@@ -64,6 +64,8 @@ struct BundleAdjustmentOptions {
   // move along that ray.
   int min_track_length = 2;
 
+  // With kCauchy, and a start whose median error is above the scale, a second
+  // solve begins with that median as its scale; the lower cost is kept.
   RobustLoss loss = RobustLoss::kTrivial;
   double loss_scale = 1;  // > 0; pixels
 
@@ -132,6 +134,9 @@ struct BundleAdjustmentSummary {
   double cost_final = 0;
   int num_iterations = 0;
   std::vector<BundleAdjustmentIteration> iterations;  // without the start
+  // The scale of the loss in the first of them, where it was not loss_scale;
+  // pixels.
+  std::optional<double> first_loss_scale;
   std::string linear_solver;                          // "dense_schur", ...
 
   std::optional<double> max_error;  // the cap at the end, pixels

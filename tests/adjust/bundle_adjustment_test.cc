@@ -455,6 +455,26 @@ TEST(AdjustBundle, WithARobustLossEndsWhereAnIndependentProblemDoes) {
   expect_same(RobustLoss::kSoftL1, &soft_l1);
 }
 
+TEST(AdjustBundle, WithCauchysLossFindsWhatADistantStartHides) {
+  SceneOptions scene = SmallOptions();
+  scene.rotation_noise_deg = 3;
+  scene.start_translation_noise = 0.1;
+  scene.start_point_noise = 0.1;
+  const Model model = SynthesizeScene(scene).model;
+  BundleAdjustmentOptions options = RotationsFixed();
+  options.max_num_iterations = 300;
+  options.loss = RobustLoss::kCauchy;
+  ceres::CauchyLoss loss(options.loss_scale);
+  const double from_the_start = IndependentFixedRotationCost(model, &loss);
+  const BundleAdjustmentSummary summary =
+      AdjustBundle(model, options, kAdjustAlone).summary;
+  EXPECT_LT(summary.cost_final, 0.98 * from_the_start);
+  EXPECT_THAT(summary.first_loss_scale,
+              testing::Optional(testing::DoubleNear(
+                  LowerMedian(PixelErrors(model, 1)), 1e-6)));
+  EXPECT_EQ(summary.iterations.size(), summary.num_iterations);
+}
+
 TEST(AdjustBundle, FindsExactModelsOfEveryCamera) {
   for (int id = 0; id < 17; ++id) {
     SCOPED_TRACE(id);

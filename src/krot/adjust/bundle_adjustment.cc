@@ -144,24 +144,73 @@ BundleAdjustmentOptions RecordIterations(const BundleAdjustmentOptions& options,
   return recorded;
 }
 
-// Solves a problem without a cap.
-void Minimize(const BundleAdjustmentOptions& options, const Context& context,
-              ceres::LossFunction* loss, AdjustmentBlocks* blocks,
-              BundleAdjustmentSummary* summary) {
+// Solves a problem without a cap, with the loss of the options.
+void MinimizeLoss(const BundleAdjustmentOptions& options,
+                  const Context& context, IterationObserver* observer,
+                  AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary) {
+  const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(options);
   ceres::Problem problem(AdjustmentProblemOptions());
-  BuildAdjustmentProblem(options, loss, blocks, &problem);
+  BuildAdjustmentProblem(options, loss.get(), blocks, &problem);
   ceres::Solver::Options solver_options =
       AdjustmentSolverOptions(options, context, blocks, problem);
   summary->linear_solver = SolverName(solver_options);
-  IterationObserver observer(options.callback, context);
-  solver_options.callbacks.push_back(&observer);
+  solver_options.callbacks.push_back(observer);
   ceres::Solver::Summary solve;
   ceres::Solve(solver_options, &problem, &solve);
   summary->termination = FromCeres(solve.termination_type);
-  summary->num_iterations = observer.num_iterations();
+  summary->num_iterations = observer->num_iterations();
+  summary->cost_final = *RobustCost(context, loss.get(), *blocks);
   summary->stationarity =
-      Stationarity(solver_options.num_threads,
-                   *RobustCost(context, loss, *blocks), &problem);
+      Stationarity(solver_options.num_threads, summary->cost_final, &problem);
+}
+
+double MedianError(const Context& context, const AdjustmentBlocks& blocks) {
+  const auto errors = ProjectErrors(blocks, kInfinity, context.num_threads);
+  std::vector<double> norms;
+  norms.reserve(errors->size());
+  for (const ProjectedError& error : *errors) norms.push_back(error.r.norm());
+  return MedianOf(norms, context);
+}
+
+// The same from where a wider loss ends, whose scale is the median error of the
+// start (graduated non-convexity) [Blake, Zisserman, Visual Reconstruction,
+// 1987].
+void MinimizeFromWiderLoss(const BundleAdjustmentOptions& options,
+                           double first_scale, const Context& context,
+                           AdjustmentBlocks* blocks,
+                           BundleAdjustmentSummary* summary) {
+  IterationObserver observer(options.callback, context);
+  BundleAdjustmentOptions stage = options;
+  stage.loss_scale = first_scale;
+  stage.function_tolerance = std::sqrt(options.function_tolerance);
+  stage.max_num_iterations = options.max_num_iterations / 2;
+  MinimizeLoss(stage, context, &observer, blocks, summary);
+  stage = options;
+  stage.max_num_iterations -= summary->num_iterations;
+  MinimizeLoss(stage, context, &observer, blocks, summary);
+  summary->first_loss_scale = first_scale;
+}
+
+// Cauchy's loss is not convex. Where most errors are above its scale, an image
+// that is far off is hardly drawn, and stays; from a wider loss it comes, but
+// then wrong observations may draw others away. So both are tried, and the
+// lower cost is kept.
+void Minimize(const BundleAdjustmentOptions& options, const Context& context,
+              AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary) {
+  const double median =
+      options.loss == RobustLoss::kCauchy ? MedianError(context, *blocks) : 0;
+  AdjustmentBlocks wider_blocks = *blocks;
+  BundleAdjustmentSummary wider = *summary;
+  if (median > options.loss_scale) {
+    MinimizeFromWiderLoss(options, median, context, &wider_blocks, &wider);
+    std::swap(wider.iterations, summary->iterations);
+  }
+  IterationObserver observer(options.callback, context);
+  MinimizeLoss(options, context, &observer, blocks, summary);
+  if (wider.first_loss_scale && wider.cost_final < summary->cost_final) {
+    *blocks = std::move(wider_blocks);
+    *summary = std::move(wider);
+  }
 }
 
 // Solves a problem below a cap, which is lowered first if the options say so.
@@ -210,7 +259,7 @@ BundleAdjustmentResult AdjustBundle(
     if (options.IsBounded()) {
       MinimizeBelowCap(recorded, context, columns, &blocks, &summary);
     } else {
-      Minimize(recorded, context, loss.get(), &blocks, &summary);
+      Minimize(recorded, context, &blocks, &summary);
     }
     summary.cost_final = *RobustCost(context, loss.get(), blocks);
     RestoreSimilarity(options, before, &blocks);

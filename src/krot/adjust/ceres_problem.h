@@ -64,7 +64,8 @@ ceres::Solver::Options AdjustmentSolverOptions(
 std::optional<double> Stationarity(int num_threads, double cost,
                                    ceres::Problem* problem);
 
-// Reports every iteration to the caller, and ends a solve that is cancelled.
+// Reports every iteration of solves that follow each other to the caller, and
+// ends them if that is asked for.
 class IterationObserver final : public ceres::IterationCallback {
  public:
   using Callback = std::function<void(const BundleAdjustmentIteration&)>;
@@ -81,7 +82,7 @@ class IterationObserver final : public ceres::IterationCallback {
     if (summary.step_is_successful || summary.iteration == 0) {
       cost_ = summary.cost;
     }
-    if (callback_) {
+    if (callback_ && (summary.iteration > 0 || num_iterations_ == 0)) {
       BundleAdjustmentIteration iteration;
       iteration.iteration = num_iterations_;
       iteration.cost = cost_;

@@ -52,8 +52,12 @@ std::string AdjustmentCountsSentence(const BundleAdjustmentSummary& summary) {
 }
 
 std::string AdjustmentEndSentence(const BundleAdjustmentSummary& summary) {
-  const std::string after =
-      " after " + Counted(summary.num_iterations, "iteration");
+  std::string after = " after " + Counted(summary.num_iterations, "iteration");
+  if (summary.first_loss_scale) {
+    after += ", the first of them with a loss scale of " +
+             FormatNumber(*summary.first_loss_scale, 2) +
+             " px, the median error of the start";
+  }
   switch (summary.termination) {
     case BundleAdjustmentTermination::kConverged:
       return "Converged" + after + ".";
@@ -235,6 +239,7 @@ std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
       {"cost_final", adjustment.cost_final},
       {"num_iterations", adjustment.num_iterations},
       {"iterations", AdjustmentIterationsJson(adjustment.iterations)},
+      {"first_loss_scale", NumberOrNull(adjustment.first_loss_scale)},
       {"linear_solver", adjustment.linear_solver},
       {"stationarity", NumberOrNull(adjustment.stationarity)},
       {"max_error", NumberOrNull(summary.max_error)},
