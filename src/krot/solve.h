@@ -76,6 +76,15 @@ struct SupportObservation {
   bool has_image_twice = false;  // its track sees the image twice
 };
 
+// An observation that the maximum rests on, too, but no proof: the lens folds, or
+// ends, within that maximum of its pixel.
+struct FoldObservation {
+  ImageId image_id = 0;
+  std::string image_name;
+  uint32_t point2D_idx = 0;
+  CameraId camera_id = 0;
+};
+
 // A known position in the certificate's support: together with the others and
 // the observations it sets the maximum.
 struct SupportPosition {
@@ -164,6 +173,7 @@ struct SolveFindings {
   // could be lower.
   std::vector<SupportObservation> support;         // worst first
   std::vector<SupportPosition> support_positions;  // largest share first
+  std::vector<FoldObservation> at_folds;           // unknown to ranks
 
   // Counts of what took part.
   int64_t num_images = 0;

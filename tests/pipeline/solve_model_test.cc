@@ -1,14 +1,17 @@
 #include "krot/pipeline/solve_model.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include "krot/camera/camera_model.h"
 #include "krot/convert/certificate_file.h"
@@ -154,6 +157,74 @@ TEST(SolveModel, ListsTheSupportWorstFirstWithMultipliersOfSumOne) {
   EXPECT_NEAR(sum, 1, 1e-12);
   // All of it lies at the maximum, but for the gap.
   EXPECT_GT(last_px, 0.98 * summary.cost_final);
+}
+
+// Gives a model's camera the distortion that turns back just beyond the ray
+// that is farthest off the axis, and moves every 2D point as that moves its
+// point. Returns that ray's 2D point.
+std::pair<const Image*, uint32_t> FoldBeyondTheFarthestRay(Model* model) {
+  struct Ray {
+    Image* image = nullptr;
+    uint32_t point2D_idx = 0;
+    Eigen::Vector2d u = Eigen::Vector2d::Zero();
+  };
+  std::vector<Ray> rays;
+  const std::vector<ImageGeometry> geometries = ImageGeometries(*model);
+  const auto images = ImageIndices(*model);
+  for (const Point3D& point : model->points3D) {
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model->track_elements[e];
+      const auto n = images.at(element.image_id);
+      const Eigen::Vector3d x_cam = geometries[n].cam_from_world * point.xyz;
+      rays.push_back(
+          {&model->images[n], element.point2D_idx, x_cam.hnormalized()});
+    }
+  }
+  const Ray farthest = *std::max_element(
+      rays.begin(), rays.end(),
+      [](const Ray& a, const Ray& b) { return a.u.norm() < b.u.norm(); });
+  Camera& camera = model->cameras[0];  // f, cx, cy, k: r (1 + k r^2)
+  const std::vector<double> before = camera.params;
+  camera.params[3] = -1 / (3 * std::pow(1.001 * farthest.u.norm(), 2));
+  for (const Ray& ray : rays) {
+    const Eigen::Vector2d moved =
+        ProjectRay({camera.model_id, camera.params.data()}, ray.u) -
+        ProjectRay({camera.model_id, before.data()}, ray.u);
+    Point2D& point2D = ray.image->points2D[ray.point2D_idx];
+    point2D.x += moved.x();
+    point2D.y += moved.y();
+  }
+  return {farthest.image, farthest.point2D_idx};
+}
+
+TEST(SolveModel, NamesWhatNoProofCanRestOnAsTheLensFolds) {
+  Model model = SynthesizeScene(SceneOf(6, 40, 4, 0.3)).model;
+  const auto [image, point2D_idx] = FoldBeyondTheFarthestRay(&model);
+  SolveModelOptions options;
+  options.method = SolveMethod::kJoint;
+  EXPECT_THAT(SolveModel(model, options).summary.at_folds,
+              ::testing::IsEmpty());
+
+  // Across the radius, so that the fold stays near.
+  Point2D& pixel =
+      model.images[image - model.images.data()].points2D[point2D_idx];
+  const std::vector<double>& params = model.cameras[0].params;
+  const Eigen::Vector2d from_centre(pixel.x - params[1], pixel.y - params[2]);
+  const Eigen::Vector2d moved =
+      from_centre.norm() *
+      (from_centre + 3 * from_centre.unitOrthogonal()).normalized();
+  pixel.x = params[1] + moved.x();
+  pixel.y = params[2] + moved.y();
+  const SolveSummary summary = SolveModel(model, options).summary;
+  ASSERT_EQ(summary.at_folds.size(), 1u);
+  EXPECT_EQ(summary.at_folds[0].image_id, image->id);
+  EXPECT_EQ(summary.at_folds[0].image_name, image->name);
+  EXPECT_EQ(summary.at_folds[0].point2D_idx, point2D_idx);
+  EXPECT_EQ(summary.at_folds[0].camera_id, model.cameras[0].id);
+  for (const SupportObservation& observation : summary.support) {
+    EXPECT_FALSE(observation.image_id == image->id &&
+                 observation.point2D_idx == point2D_idx);
+  }
 }
 
 TEST(SolveModel, IsDoneAtOnceWhereEveryErrorIsZero) {

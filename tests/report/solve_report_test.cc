@@ -167,6 +167,16 @@ TEST(SolveTable, SaysBothGapsWhereTheTrueOneIsTheLarger) {
   EXPECT_THAT(table, HasSubstr("below 3.9800 px." + both));
   EXPECT_THAT(table, HasSubstr("Stalled after 2 rounds, 1 iteration to a "));
 
+  EXPECT_THAT(table, HasSubstr("; the rest is the curvature of lenses"));
+  report.summary.at_folds = {{7, "north.jpg", 41, 3}, {8, "south.jpg", 2, 3}};
+  EXPECT_THAT(
+      SolveTable(report),
+      HasSubstr(both + "; the rest is lost where a lens folds: point2D "
+                       "41 of north.jpg lies nearer than the maximum to "
+                       "where camera 3 maps two rays to one pixel, so "
+                       "that no proof can rest on it, nor on 1 other. "
+                       "A fisheye model may suit this camera."));
+
   report.summary.rounds.back().linear_lower_bound = 3.98;
   EXPECT_THAT(SolveTable(report), Not(HasSubstr(both)));
   report.summary.rounds.back().linear_lower_bound.reset();

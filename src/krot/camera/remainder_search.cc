@@ -72,6 +72,12 @@ bool IsOutside(const Enclosure& enclosure, double p) {
   return IntervalNorm(enclosure.f[0], enclosure.f[1], p).lo > 1;
 }
 
+// Whether the box is beyond a fold, and |f| <= 1 on all of it.
+bool IsFoldedInside(const Enclosure& enclosure, double p) {
+  return enclosure.determinant.hi <= 0 &&
+         IntervalNorm(enclosure.f[0], enclosure.f[1], p).hi <= 1;
+}
+
 // An upper bound on |m| where |f| <= 1, from m = f - r:
 //   p = 2:         |m|^2 = |f|^2 - r'(f + m) <= 1 - r'(2 f - r)
 //   p = 1, inf:    s'm = s'f - s'r <= 1 - s'r for all s with |s|_* = 1,
@@ -159,16 +165,18 @@ bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
 
 // Branch and bound: an upper bound over all points of the box |q|_inf <= reach
 // with |f| <= 1. `bound_on` returns an upper bound on a smaller box. Ends when
-// the bound is at most `target`, or with the budget of 4000 cells.
+// the bound is at most `target`, at a fold, or with the budget of 4000 cells.
 template <typename BoundOn>
 std::optional<double> Search(const ErrorMap& map, double p, double reach,
                              double target, const BoundOn& bound_on) {
   std::vector<Cell> heap;
   int num_cells = 0;
+  bool is_folded = false;
   const auto add = [&](const Box& box) {
     ++num_cells;
     const Enclosure enclosure = Enclose(map, box);
     if (IsOutside(enclosure, p)) return;
+    is_folded |= IsFoldedInside(enclosure, p);
     const double bound =
         enclosure.determinant.lo > 0 ? bound_on(enclosure) : kNaN;
     heap.push_back({box, bound < kInfinity ? bound : kInfinity});
@@ -177,7 +185,8 @@ std::optional<double> Search(const ErrorMap& map, double p, double reach,
 
   const Interval side = {-reach, reach};
   add({{side, side}});
-  while (!heap.empty() && heap.front().bound > target && num_cells < 4000) {
+  while (!heap.empty() && heap.front().bound > target && num_cells < 4000 &&
+         !is_folded) {
     const auto [first, second] = Halves(heap.front().box);
     std::pop_heap(heap.begin(), heap.end(), ComesLater);
     heap.pop_back();
@@ -186,7 +195,9 @@ std::optional<double> Search(const ErrorMap& map, double p, double reach,
   }
   // The box with the pixel's own ray is never outside, so the heap should not
   // become empty.
-  if (heap.empty() || heap.front().bound == kInfinity) return std::nullopt;
+  if (is_folded || heap.empty() || heap.front().bound == kInfinity) {
+    return std::nullopt;
+  }
   return heap.front().bound;
 }
 

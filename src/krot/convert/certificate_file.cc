@@ -197,6 +197,20 @@ std::vector<SupportObservation> ListSupport(const Model& model,
   return support;
 }
 
+std::vector<FoldObservation> ListFolds(const Model& model,
+                                       const BuiltProblem& built,
+                                       const std::vector<int64_t>& at_folds) {
+  std::vector<FoldObservation> folds;
+  for (const int64_t i : at_folds) {
+    const Image& image =
+        model.images[built.image_of[built.problem.observations[i].view]];
+    folds.push_back({image.id, image.name,
+                     static_cast<uint32_t>(built.point2D_of[i]),
+                     image.camera_id});
+  }
+  return folds;
+}
+
 void Describe(const Model& model, const BuiltProblem& built,
               const PixelCertificate& certificate, DescribedProof* proof) {
   proof->lower_bound = certificate.lower_bound;

@@ -68,6 +68,11 @@ std::vector<SupportObservation> ListSupport(const Model& model,
                                             const Estimate& estimate, Norm norm,
                                             const Certificate& certificate);
 
+// Those of PixelCertificate::at_folds.
+std::vector<FoldObservation> ListFolds(const Model& model,
+                                       const BuiltProblem& built,
+                                       const std::vector<int64_t>& at_folds);
+
 // What the files of certificates and of conflicts have in common: the proof of
 // a bound in true pixels (pixel_certificate.h) in terms of the model's ids.
 struct DescribedProof {

@@ -151,7 +151,7 @@ std::optional<PixelCertificate> MakePixelCertificate(
     const Context& context) {
   if (rows.observations.empty()) return std::nullopt;
   const Reprojection reprojection(model, built);
-  PixelCertificate certificate{rows, std::move(bearings), 0};
+  PixelCertificate certificate{rows, std::move(bearings), 0, {}};
   double gamma = rows.lower_bound * (1 - kMargin);
   // Corrections of gamma; mostly two are enough.
   for (int n = 0; n < 8; ++n) {

@@ -48,6 +48,9 @@ struct PixelCertificate {
   // axes.
   std::vector<Eigen::Vector3d> bearings;
   double lower_bound = 0;  // gamma, true pixels; <= rows.lower_bound
+  // Observations that were left out of the support because they have no region,
+  // ascending. They prove nothing.
+  std::vector<int64_t> at_folds;
 };
 
 struct PixelCertificateCheck {

@@ -55,6 +55,7 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
                                               const Context& context) {
   std::vector<double> widths(support.size(), 1);
   std::optional<PixelCertificate> best;
+  std::vector<int64_t> at_folds;
   JointOptions options;
   options.norm = norm;
   options.relative_gap = 1e-7;  // far below any that users ask for
@@ -79,6 +80,7 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
         model, built, norm, certificate, bearings, context);
     if (candidate && (!best || candidate->lower_bound > best->lower_bound)) {
       best = candidate;
+      best->at_folds = at_folds;
     }
     if (best &&
         (best->lower_bound >= sufficient ||
@@ -93,8 +95,11 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
     std::vector<int64_t> left;
     std::vector<double> widths_left;
     for (size_t n = 0; n < lines.size(); ++n) {
-      if (!std::isfinite(lines[n])) continue;
       const int64_t i = certificate.observations[n].observation;
+      if (!std::isfinite(lines[n])) {
+        at_folds.push_back(i);
+        continue;
+      }
       const auto place = std::lower_bound(support.begin(), support.end(), i);
       double width = widths[place - support.begin()];
       if (built.HasPixel(i)) {  // rows of positions are never widened
@@ -103,6 +108,7 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
       left.push_back(i);
       widths_left.push_back(width);
     }
+    std::sort(at_folds.begin(), at_folds.end());
     support = std::move(left);
     widths = std::move(widths_left);
   }
@@ -118,6 +124,7 @@ void NameValues(StepValues* values, std::optional<PixelCertificate>* proof) {
     values->Value(&p->rows.defect);
     values->OnFirst(&p->rows.observations);
     values->OnFirst(&p->bearings);
+    values->OnFirst(&p->at_folds);
   });
 }
 
@@ -170,7 +177,10 @@ std::optional<PixelCertificate> ProveSharedRows(
     proof = ProveHere(gathered.model, gathered.built, gathered.estimate, norm,
                       of_built ? &*of_built : nullptr, gathered.observations,
                       sufficient, here);
-    if (proof) proof->rows = gathered.ToWhole(std::move(proof->rows));
+    if (proof) {
+      proof->rows = gathered.ToWhole(std::move(proof->rows));
+      proof->at_folds.clear();
+    }
   }
   bool is_proved = proof.has_value();
   ranks.Broadcast(&is_proved);
@@ -257,6 +267,7 @@ void Certify(const Model& model, const BuiltProblem& built,
         ListSupport(model, built, estimate, options.norm, certificate->rows);
     summary->support_positions =
         ListSupportPositions(model, built, estimate, *certificate);
+    summary->at_folds = ListFolds(model, built, certificate->at_folds);
     if (options.describe_certificate) {
       summary->certificate =
           DescribeCertificate(model, built, options.norm, *certificate);

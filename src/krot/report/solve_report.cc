@@ -167,6 +167,15 @@ Json SupportJson(const std::vector<SupportObservation>& support) {
   });
 }
 
+Json FoldsJson(const std::vector<FoldObservation>& folds) {
+  return ListJson(folds, [&](const FoldObservation& observation) -> Json {
+    return {{"image_id", observation.image_id},
+            {"image_name", observation.image_name},
+            {"point2D_idx", observation.point2D_idx},
+            {"camera_id", observation.camera_id}};
+  });
+}
+
 Json FactorJson(const std::optional<PositionFactor>& factor) {
   if (!factor) return nullptr;
   return {{"value", factor->factor},
@@ -314,6 +323,7 @@ std::string SolveJson(const SolveReport& report) {
       {"iterations", JointIterationsJson(summary.iterations)},
       {"support", SupportJson(summary.support)},
       {"support_positions", PositionsJson(summary.support_positions)},
+      {"at_folds", FoldsJson(summary.at_folds)},
       {"announced_memory_bytes", summary.needed_bytes},
   };
   return ReportText(json, report.run,

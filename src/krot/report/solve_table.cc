@@ -63,6 +63,20 @@ std::string BoundWords(const SolveSummary& summary) {
          FormatNumber(bound, 4) + " px";
 }
 
+// Of a gap: the lens that it is due to. Requires some.
+std::string FoldWords(const SolveSummary& summary) {
+  const FoldObservation& first = summary.at_folds.front();
+  const auto num_others = static_cast<int64_t>(summary.at_folds.size()) - 1;
+  return "; the rest is lost where a lens folds: point2D " +
+         std::to_string(first.point2D_idx) + " of " + first.image_name +
+         " lies nearer than the maximum to where camera " +
+         std::to_string(first.camera_id) +
+         " maps two rays to one pixel, so that no proof can rest on it" +
+         (num_others == 0 ? std::string()
+                          : ", nor on " + Counted(num_others, "other")) +
+         ". A fisheye model may suit this camera.";
+}
+
 // Explains why the true gap is not reached if the linear problem's gap is much
 // smaller.
 std::string LinearGapSentence(const SolveSummary& summary) {
@@ -73,7 +87,9 @@ std::string LinearGapSentence(const SolveSummary& summary) {
   }
   return " With every error linearised at this estimate the gap is " +
          GapPercent(*linear_gap) +
-         "; the rest is the curvature of lenses, and rounding.";
+         (summary.at_folds.empty()
+              ? "; the rest is the curvature of lenses, and rounding."
+              : FoldWords(summary));
 }
 
 // Reports the finish: what the room above the lowest maximum was used for.
