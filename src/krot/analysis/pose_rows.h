@@ -7,7 +7,6 @@
 
 #include "krot/analysis/noise.h"
 #include "krot/check.h"
-#include "krot/linear/small_matrices.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 
@@ -98,22 +97,5 @@ class SharedColumns {
   std::vector<int32_t> place_of_image_;  // -1: a reference sensor
   Eigen::Index num_columns_ = 0;
 };
-
-// -M^+ g in the directions that are determined; M is symmetric. As unknowns
-// have different units, its diagonal is scaled to 1 first: nothing determines
-// directions whose eigenvalues are below 1e-9 then.
-template <typename Vector, typename Matrix>
-Vector DeterminedStep(const Matrix& M, const Vector& g) {
-  Vector scale = M.diagonal().cwiseMax(0).cwiseSqrt();
-  for (double& s : scale) s = s > 0 ? 1 / s : 0;
-  const Eigenpairs of_M =
-      EigenpairsOf(scale.asDiagonal() * M * scale.asDiagonal());
-  Vector y = of_M.vectors.transpose() * scale.cwiseProduct(g);
-  for (Eigen::Index j = 0; j < y.size(); ++j) {
-    const double value = of_M.values[j];
-    y[j] = value > 1e-9 ? -y[j] / value : 0;
-  }
-  return scale.cwiseProduct(of_M.vectors * y);
-}
 
 }  // namespace krot::internal
