@@ -137,7 +137,7 @@ struct BundleAdjustmentSummary {
   // The scale of the loss in the first of them, where it was not loss_scale;
   // pixels.
   std::optional<double> first_loss_scale;
-  std::string linear_solver;                          // "dense_schur", ...
+  std::string linear_solver;  // "dense_schur", ...
 
   std::optional<double> max_error;  // the cap at the end, pixels
   // With lower_max_error: the lowest largest error that was reached. It is

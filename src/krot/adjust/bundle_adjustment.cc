@@ -144,6 +144,14 @@ BundleAdjustmentOptions RecordIterations(const BundleAdjustmentOptions& options,
   return recorded;
 }
 
+double MedianError(const Context& context, const AdjustmentBlocks& blocks) {
+  const auto errors = ProjectErrors(blocks, kInfinity, context.num_threads);
+  std::vector<double> norms;
+  norms.reserve(errors->size());
+  for (const ProjectedError& error : *errors) norms.push_back(error.r.norm());
+  return MedianOf(norms, context);
+}
+
 // Solves a problem without a cap, with the loss of the options.
 void MinimizeLoss(const BundleAdjustmentOptions& options,
                   const Context& context, IterationObserver* observer,
@@ -162,14 +170,6 @@ void MinimizeLoss(const BundleAdjustmentOptions& options,
   summary->cost_final = *RobustCost(context, loss.get(), *blocks);
   summary->stationarity =
       Stationarity(solver_options.num_threads, summary->cost_final, &problem);
-}
-
-double MedianError(const Context& context, const AdjustmentBlocks& blocks) {
-  const auto errors = ProjectErrors(blocks, kInfinity, context.num_threads);
-  std::vector<double> norms;
-  norms.reserve(errors->size());
-  for (const ProjectedError& error : *errors) norms.push_back(error.r.norm());
-  return MedianOf(norms, context);
 }
 
 // The same from where a wider loss ends, whose scale is the median error of the
@@ -197,17 +197,19 @@ void MinimizeFromWiderLoss(const BundleAdjustmentOptions& options,
 // lower cost is kept.
 void Minimize(const BundleAdjustmentOptions& options, const Context& context,
               AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary) {
-  const double median =
-      options.loss == RobustLoss::kCauchy ? MedianError(context, *blocks) : 0;
+  const auto minimize = [&] {
+    IterationObserver observer(options.callback, context);
+    MinimizeLoss(options, context, &observer, blocks, summary);
+  };
+  if (options.loss != RobustLoss::kCauchy) return minimize();
+  const double median = MedianError(context, *blocks);
+  if (!(median > options.loss_scale)) return minimize();
   AdjustmentBlocks wider_blocks = *blocks;
   BundleAdjustmentSummary wider = *summary;
-  if (median > options.loss_scale) {
-    MinimizeFromWiderLoss(options, median, context, &wider_blocks, &wider);
-    std::swap(wider.iterations, summary->iterations);
-  }
-  IterationObserver observer(options.callback, context);
-  MinimizeLoss(options, context, &observer, blocks, summary);
-  if (wider.first_loss_scale && wider.cost_final < summary->cost_final) {
+  MinimizeFromWiderLoss(options, median, context, &wider_blocks, &wider);
+  std::swap(wider.iterations, summary->iterations);
+  minimize();
+  if (wider.cost_final < summary->cost_final) {
     *blocks = std::move(wider_blocks);
     *summary = std::move(wider);
   }
