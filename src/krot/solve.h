@@ -76,8 +76,8 @@ struct SupportObservation {
   bool has_image_twice = false;  // its track sees the image twice
 };
 
-// An observation that the maximum rests on, too, but no proof: the lens folds, or
-// ends, within that maximum of its pixel.
+// An observation that the maximum rests on, too, but no proof: the projection
+// folds or ends within that maximum of its pixel.
 struct FoldObservation {
   ImageId image_id = 0;
   std::string image_name;

@@ -169,13 +169,13 @@ TEST(SolveTable, SaysBothGapsWhereTheTrueOneIsTheLarger) {
 
   EXPECT_THAT(table, HasSubstr("; the rest is the curvature of lenses"));
   report.summary.at_folds = {{7, "north.jpg", 41, 3}, {8, "south.jpg", 2, 3}};
-  EXPECT_THAT(
-      SolveTable(report),
-      HasSubstr(both + "; the rest is lost where a lens folds: point2D "
-                       "41 of north.jpg lies nearer than the maximum to "
-                       "where camera 3 maps two rays to one pixel, so "
-                       "that no proof can rest on it, nor on 1 other. "
-                       "A fisheye model may suit this camera."));
+  EXPECT_THAT(SolveTable(report),
+              HasSubstr(both + "; the rest is lost at the edge of a lens: "
+                               "point2D 41 of north.jpg lies nearer than the "
+                               "maximum to where the projection of camera 3 "
+                               "folds or ends, so that no proof can rest on "
+                               "it, nor on 1 other. Another camera model may "
+                               "suit it better."));
 
   report.summary.rounds.back().linear_lower_bound = 3.98;
   EXPECT_THAT(SolveTable(report), Not(HasSubstr(both)));

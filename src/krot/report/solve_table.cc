@@ -67,14 +67,14 @@ std::string BoundWords(const SolveSummary& summary) {
 std::string FoldWords(const SolveSummary& summary) {
   const FoldObservation& first = summary.at_folds.front();
   const auto num_others = static_cast<int64_t>(summary.at_folds.size()) - 1;
-  return "; the rest is lost where a lens folds: point2D " +
+  return "; the rest is lost at the edge of a lens: point2D " +
          std::to_string(first.point2D_idx) + " of " + first.image_name +
-         " lies nearer than the maximum to where camera " +
+         " lies nearer than the maximum to where the projection of camera " +
          std::to_string(first.camera_id) +
-         " maps two rays to one pixel, so that no proof can rest on it" +
+         " folds or ends, so that no proof can rest on it" +
          (num_others == 0 ? std::string()
                           : ", nor on " + Counted(num_others, "other")) +
-         ". A fisheye model may suit this camera.";
+         ". Another camera model may suit it better.";
 }
 
 // Explains why the true gap is not reached if the linear problem's gap is much
