@@ -108,8 +108,9 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
           "threads", "seed", "rounds", "linear_cost", "linear_lower_bound",
           "linear_relative_gap", "is_given_back", "contradictions", "finish",
           "same_image", "outliers", "rotations", "fixed", "positions",
-          "support_positions", "poses", "not_held", "announced_memory_bytes",
-          "verdict", "collapse", "is_underdetermined", "matches", "distances"));
+          "support_positions", "at_folds", "poses", "not_held",
+          "announced_memory_bytes", "verdict", "collapse", "is_underdetermined",
+          "matches", "distances"));
   EXPECT_THAT(Keys(report["finish"]),
               ::testing::UnorderedElementsAre(
                   "finish", "loss", "termination", "cap", "lowest_cost",
