@@ -475,6 +475,26 @@ TEST(AdjustBundle, WithCauchysLossFindsWhatADistantStartHides) {
   EXPECT_EQ(summary.iterations.size(), summary.num_iterations);
 }
 
+// Where wrong observations draw cameras away as long as the loss is wide.
+TEST(AdjustBundle, WithCauchysLossEndsNoHigherThanWithoutAWiderOne) {
+  SceneOptions scene = SceneOf(12, 180, 3, 0.5, 2);
+  scene.layout = SceneLayout::kStreet;
+  scene.camera_model_id = 1;
+  scene.outlier_ratio = 0.1;
+  scene.rotation_noise_deg = 3;
+  scene.start_translation_noise = 0.02;
+  scene.start_point_noise = 0.02;
+  const SyntheticScene street = SynthesizeScene(scene);
+  BundleAdjustmentOptions options;
+  options.loss = RobustLoss::kCauchy;
+  const auto adjust = [&](const Model& model) {
+    return AdjustBundle(model, options, kAdjustAlone).summary;
+  };
+  EXPECT_GT(Median(PixelErrors(street.model, 1)), options.loss_scale);
+  EXPECT_LT(adjust(street.model).cost_final,
+            1.01 * adjust(street.ground_truth).cost_final);
+}
+
 TEST(AdjustBundle, FindsExactModelsOfEveryCamera) {
   for (int id = 0; id < 17; ++id) {
     SCOPED_TRACE(id);

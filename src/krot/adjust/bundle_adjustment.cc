@@ -172,9 +172,8 @@ void MinimizeLoss(const BundleAdjustmentOptions& options,
       Stationarity(solver_options.num_threads, summary->cost_final, &problem);
 }
 
-// The same from where a wider loss ends, whose scale is the median error of the
-// start (graduated non-convexity) [Blake, Zisserman, Visual Reconstruction,
-// 1987].
+// The same from where a loose solve with a wider loss ends (graduated
+// non-convexity) [Blake, Zisserman, Visual Reconstruction, 1987].
 void MinimizeFromWiderLoss(const BundleAdjustmentOptions& options,
                            double first_scale, const Context& context,
                            AdjustmentBlocks* blocks,
@@ -260,10 +259,10 @@ BundleAdjustmentResult AdjustBundle(
         RecordIterations(options, &summary);
     if (options.IsBounded()) {
       MinimizeBelowCap(recorded, context, columns, &blocks, &summary);
+      summary.cost_final = *RobustCost(context, nullptr, blocks);
     } else {
       Minimize(recorded, context, &blocks, &summary);
     }
-    summary.cost_final = *RobustCost(context, loss.get(), blocks);
     RestoreSimilarity(options, before, &blocks);
   }
   result.model = ApplyBlocks(model, before, blocks);
