@@ -141,7 +141,7 @@ function(krot_test name)
   cmake_parse_arguments(ARG "" "SLOW" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   krot_warnings(${name})
-  krot_cold(${name})
+  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-Og>)
   krot_precompiled_headers(${name} TEST)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name}

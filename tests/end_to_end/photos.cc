@@ -19,8 +19,8 @@ namespace fs = std::filesystem;
 constexpr int kWidth = 512;
 constexpr int kHeight = 384;
 constexpr int kNumViews = 24;  // of the sample
-constexpr int kFirstView = 7;
-constexpr int kLastView = 18;
+constexpr int kFirstView = 8;
+constexpr int kLastView = 17;
 
 std::string PhotoName(int view) {
   std::string digits = std::to_string(view);

@@ -7,7 +7,7 @@
 
 namespace krot::internal {
 
-// Photos of the sample's scene (tools/sample), small enough for a test: twelve
+// Photos of the sample's scene (tools/sample), small enough for a test: ten
 // neighbouring views of its twenty-four, at half the width and height, as PPM.
 
 bool HasPovray();

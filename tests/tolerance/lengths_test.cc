@@ -59,10 +59,10 @@ struct MeasuredScene {
 
 // The bar is between cameras, points, or one of each, and off within its own
 // tolerance; lenses and rigs take turns.
-TEST(LengthsThatDataAllow, HoldTheTruthInEachOfAHundredScenes) {
+TEST(LengthsThatDataAllow, HoldTheTruthInEveryScene) {
   int num_lengths = 0;
   int num_proved = 0;
-  for (uint64_t seed = 1; seed <= 100; ++seed) {
+  for (uint64_t seed = 1; seed <= 36; ++seed) {
     SCOPED_TRACE(seed);
     MeasuredScene scene(seed, seed % 4 == 0 ? 2 : 1,
                         std::array{1, 2, 4}[seed % 3]);
