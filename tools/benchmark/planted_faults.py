@@ -27,7 +27,9 @@ Rivals call wrong: `mean`: an image whose mean error is more than twice the medi
 image's; `2 px`: an observation of more than 2 px, an image with more than half of
 its observations above. What each calls wrong without the fault is not counted.
 Planted images that keep fewer than ten observations are a column of their own:
-little says that they are wrong, but nothing holds them either.
+little says that they are wrong, but nothing holds them either. Others that are
+left with so few, as their tracks went with a planted one, are not counted: to
+say that nothing holds them is no false alarm.
 """
 
 import copy
@@ -295,7 +297,7 @@ class Counts:
             found = planted & those - thin
             self.found[rival] += len(found)
             self.called[rival] += len(found) + len(
-                those - planted - before[rival])
+                those - planted - before[rival] - thin)
 
     def row(self):
         cells = [str(self.planted), f"{self.thin_found} of {self.thin}"]
@@ -324,7 +326,7 @@ def wrong_images(base, folder, rng, change, how, counts):
         final = folder / "filtered"
     report = check(base.krot, final, folder)
     model = Model(final)
-    thin = {i for i in planted
+    thin = {i for i in images
             if i not in model.images or len(model.errors(i)) < FEWEST}
     counts.add(planted, called_images(report, model), base.images, thin)
 
