@@ -112,11 +112,12 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
 //   sum_i weight_i (|r_i + dr_i|^2 + (damping c dw_i / w_i)^2).
 //
 // The problem may have several components and must have nothing fixed. Ends
-// where a step lowers the sum by less than 0.03 %, at the latest after 30. If
-// most observations do not see their points, nothing moves. The same bits at
-// any number of threads. A step takes O(observations) and a factorisation of
-// the reduced camera system.
+// where a step lowers the sum by less than `tolerance` of it, at the latest
+// after 30. If most observations do not see their points, nothing moves. The
+// same bits at any number of threads. A step takes O(observations) and a
+// factorisation of the reduced camera system.
 void MinimizeRobustly(const KnownRotationProblem& problem,
-                      const Context& context, Estimate* estimate);
+                      const Context& context, Estimate* estimate,
+                      double tolerance = 3e-4);
 
 }  // namespace krot::internal

@@ -18,9 +18,10 @@ constexpr double kFactor = 2;
 
 class RobustLeastSquares {
  public:
-  RobustLeastSquares(const KnownRotationProblem& problem,
+  RobustLeastSquares(const KnownRotationProblem& problem, double tolerance,
                      const Context& context, Estimate* estimate)
       : problem_(problem),
+        tolerance_(tolerance),
         context_(context),
         loop_(static_cast<int64_t>(problem.observations.size()),
               context.num_threads),
@@ -127,7 +128,7 @@ class RobustLeastSquares {
           const bool is_wide = factor_ > kFactor;
           factor_ = std::max(kFactor, factor_ / 2);
           TakeScale();
-          return is_wide || after < (1 - 3e-4) * before;
+          return is_wide || after < (1 - tolerance_) * before;
         }
       }
       damping_ *= 4;
@@ -136,6 +137,7 @@ class RobustLeastSquares {
   }
 
   const KnownRotationProblem& problem_;
+  const double tolerance_;
   const Context& context_;
   const ObservationLoop loop_;
   const BlockStructure structure_;
@@ -153,8 +155,9 @@ class RobustLeastSquares {
 }  // namespace
 
 void MinimizeRobustly(const KnownRotationProblem& problem,
-                      const Context& context, Estimate* estimate) {
-  RobustLeastSquares(problem, context, estimate).Run();
+                      const Context& context, Estimate* estimate,
+                      double tolerance) {
+  RobustLeastSquares(problem, tolerance, context, estimate).Run();
 }
 
 }  // namespace krot::internal

@@ -187,22 +187,34 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
                                       counts[pair.b].num_tracks)));
     }
     SortStrongestFirst(&pairs);
-    // Unites every group with the first pair that ties it. In each pass a group
-    // is united with at most one other, because the tracks that it shares
-    // change by that.
+    // Unites every group by the first pair that ties it. As what it shares
+    // changes by that, in each pass a group is united with one other, or with
+    // any number of smaller ones that it ties.
+    enum class Pass : char { kFree, kTakesSmaller, kIsUnited };
+    std::vector<Pass> in_pass(problem.num_frames, Pass::kFree);
     std::vector<char> has_best(problem.num_frames, 0);
-    std::vector<char> is_done(problem.num_frames, 0);
     goes_on = false;
     for (const GroupPair& pair : pairs) {
-      bool is_best = false;
-      for (const int32_t group : {pair.a, pair.b}) {
-        if (has_best[group]) continue;
+      const auto [smaller, larger] = sizes[pair.a] < sizes[pair.b]
+                                         ? std::pair(pair.a, pair.b)
+                                         : std::pair(pair.b, pair.a);
+      const auto is_best_of = [&](int32_t group) {
+        if (has_best[group]) return false;
         has_best[group] = is_tied(group, pair);
-        is_best = is_best || has_best[group];
-      }
-      if (!is_best || is_done[pair.a] || is_done[pair.b]) continue;
-      is_done[pair.a] = is_done[pair.b] = 1;
-      sets.Unite(pair.a, pair.b);
+        return has_best[group] != 0;
+      };
+      const bool is_best_of_larger = is_best_of(larger);
+      const bool is_best_of_smaller = is_best_of(smaller);
+      const bool is_possible = in_pass[larger] == Pass::kFree
+                                   ? is_best_of_larger || is_best_of_smaller
+                                   : in_pass[larger] == Pass::kTakesSmaller &&
+                                         is_best_of_smaller &&
+                                         sizes[smaller] < sizes[larger];
+      if (!is_possible || in_pass[smaller] != Pass::kFree) continue;
+      in_pass[smaller] = Pass::kIsUnited;
+      in_pass[larger] = sizes[smaller] < sizes[larger] ? Pass::kTakesSmaller
+                                                       : Pass::kIsUnited;
+      sets.Unite(smaller, larger);
       goes_on = true;
     }
     find_all();

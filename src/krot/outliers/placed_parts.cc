@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -139,28 +140,36 @@ int32_t MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
                         double level, const Context& context,
                         Estimate* estimate) {
   MinimizeRobustly(problem, context, estimate);
-  // What has not helped is tried again only after something else has: it takes
-  // a descent each.
+  // What has not helped is tried again only after something else has.
   bool joins_parts = true, places_frames = true, places_points = true;
+  double cap = 0;
+  std::optional<Agreement> now;
+  std::vector<int32_t> part_of;
   for (int n = 0;; ++n) {
-    const double cap =
-        kCapOfPoints * std::max(level, MedianError(problem, *estimate, norm));
-    const Agreement now(problem, *estimate, norm, cap);
-    const std::vector<int32_t> part_of = FindParts(problem, now.agrees, {});
+    if (!now) {
+      cap =
+          kCapOfPoints * std::max(level, MedianError(problem, *estimate, norm));
+      now.emplace(problem, *estimate, norm, cap);
+      part_of = FindParts(problem, now->agrees, {});
+    }
     const int32_t num_parts = NumParts(part_of);
     if (n == 8 || context.IsCancelled()) return num_parts;
     Estimate moved = *estimate;
     const auto gain = [&] {
-      return NumAgreeing(problem, moved, norm, cap) - now.num_agreeing;
+      return NumAgreeing(problem, moved, norm, cap) - now->num_agreeing;
+    };
+    // By a thousandth: less is not worth a descent.
+    const auto is_much = [&](int64_t num_more) {
+      return 1000 * num_more > now->num_agreeing;
     };
     bool* tried = &places_points;
-    std::vector<int32_t> loose_points = now.loose_points;
+    std::vector<int32_t> loose_points = now->loose_points;
     if (num_parts > 1 && joins_parts) {
       tried = &joins_parts;
       PlaceParts(problem, part_of, norm, level, context, {}, &moved);
-    } else if (!now.loose_frames.empty() && places_frames) {
+    } else if (!now->loose_frames.empty() && places_frames) {
       tried = &places_frames;
-      PlaceFramesRobustly(problem, now.loose_frames, now.is_placed, norm,
+      PlaceFramesRobustly(problem, now->loose_frames, now->is_placed, norm,
                           kCapOfPoints * level, context, &moved);
       loose_points = Agreement(problem, moved, norm, cap).loose_points;
     } else if (loose_points.empty() || !places_points) {
@@ -168,15 +177,19 @@ int32_t MinimizeAndJoin(const KnownRotationProblem& problem, Norm norm,
     }
     PlacePointsRobustly(problem, loose_points, norm, kCapOfPoints * level,
                         context, &moved);
-    if (tried != &places_points || gain() > 0) {
+    int64_t num_more = gain();
+    if (tried == &joins_parts || is_much(num_more)) {
       MinimizeRobustly(problem, context, &moved);
+      num_more = gain();
     }
-    const int64_t num_more = gain();
-    if (num_more > 0) *estimate = std::move(moved);
-    if (1000 * num_more > now.num_agreeing) {
+    if (is_much(num_more)) {
       joins_parts = places_frames = places_points = true;
     } else {
       *tried = false;
+    }
+    if (num_more > 0) {
+      *estimate = std::move(moved);
+      now.reset();
     }
   }
 }

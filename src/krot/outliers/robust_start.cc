@@ -24,6 +24,8 @@ namespace {
 // The size of a core, where the whole has more than twice as many. The dense
 // factor of so many costs next to nothing.
 constexpr int32_t kCoreFrames = 150;
+// The tolerance of descents whose end another one starts from.
+constexpr double kRoughly = 3e-3;
 
 // The observations of some of the longest tracks, ascending: a track is taken
 // if it sees a frame that has too little redundancy so far.
@@ -123,7 +125,7 @@ class GrownStart {
     Estimate own =
         StartByProgramme(core.problem(), ConnectedTracks(core.problem()), norm_,
                          level_, context_);
-    MinimizeRobustly(core.problem(), context_, &own);
+    MinimizeRobustly(core.problem(), context_, &own, kRoughly);
     if (!HasBaseline(problem_)) NormalizeScale(core.problem(), &own);
     core.Replace(own, &estimate_);
     MarkPoints(core);
@@ -144,7 +146,7 @@ class GrownStart {
                           kCapOfPoints * level_, context_, &grown);
       const int32_t num_placed = problem_.num_frames - num_left_;
       if (num_left_ > 0 && num_placed >= 2 * num_improved) {
-        MinimizeRobustly(placed.problem(), context_, &grown);
+        MinimizeRobustly(placed.problem(), context_, &grown, kRoughly);
         num_improved = num_placed;
       }
       placed.Replace(grown, &estimate_);
