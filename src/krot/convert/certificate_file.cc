@@ -307,6 +307,27 @@ CertificateFile DescribeCertificate(const Model& model,
   return file;
 }
 
+ConflictFile DescribeConflicts(
+    const Model& model, const BuiltProblem& built, Norm norm, double max_error,
+    const std::vector<PixelCertificate>& certificates) {
+  ConflictFile file;
+  file.norm = norm;
+  file.max_error = max_error;
+  file.model_sha256 = ModelSha256(model);
+  if (!built.scales.empty()) file.version = kConflictFileVersion;
+  for (const PixelCertificate& certificate : certificates) {
+    ConflictFile::Conflict conflict;
+    Describe(model, built, certificate, &conflict);
+    if (!built.scales.empty()) {
+      for (const CertifiedObservation& o : certificate.rows.observations) {
+        conflict.max_errors.push_back(built.scales[o.observation] * max_error);
+      }
+    }
+    file.conflicts.push_back(std::move(conflict));
+  }
+  return file;
+}
+
 std::string ReadCertificateText(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   std::ostringstream text;

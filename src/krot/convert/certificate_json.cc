@@ -221,4 +221,46 @@ bool HasMember(const std::string& json, const char* key) {
   return parsed.is_object() && parsed.contains(key);
 }
 
+std::string ConflictJson(const ConflictFile& file) {
+  Json json = {{"version", file.version},
+               {"norm", NormJson(file.norm)},
+               {"max_error", file.max_error},
+               {"model_sha256", file.model_sha256}};
+  json["conflicts"] = ListJson(file.conflicts, [&](const auto& conflict) {
+    Json one = {{"lower_bound", conflict.lower_bound},
+                {"rows_bound", conflict.rows_bound},
+                {"defect", conflict.defect},
+                {"observations", SupportJson(conflict.observations)}};
+    if (file.version == kConflictFileVersion) {
+      one["max_errors"] = conflict.max_errors;
+    }
+    return one;
+  });
+  return json.dump(1) + "\n";
+}
+
+bool HoldsConflicts(const std::string& json) {
+  return HasMember(json, "conflicts");
+}
+
+ConflictFile ParseConflicts(const std::string& text,
+                            const std::string& file_name) {
+  return ParseFile(text, file_name, [](const PlacedJson& json) {
+    ConflictFile file;
+    file.version = ReadVersion(json, 1, kConflictFileVersion);
+    file.norm = ReadNorm(json["norm"]);
+    file.max_error = json["max_error"].Number();
+    file.model_sha256 = json["model_sha256"].String();
+    for (const PlacedJson& one : json["conflicts"].Elements()) {
+      ConflictFile::Conflict& conflict = file.conflicts.emplace_back();
+      ReadProof(one, &conflict);
+      if (file.version != kConflictFileVersion) continue;
+      for (const PlacedJson& bound : one["max_errors"].Elements()) {
+        conflict.max_errors.push_back(bound.Number());
+      }
+    }
+    return file;
+  });
+}
+
 }  // namespace krot::internal
