@@ -1,7 +1,9 @@
 // The commands. Each takes a Model and keywords, which have the names of the
 // command line, and returns the new Model and the command's report as JSON.
 
+#include <chrono>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,10 +21,7 @@
 #include "krot/pipeline/adjust_model.h"
 #include "krot/report/reports.h"
 #include "krot/version.h"
-#include "python/bindings.h"
 #include "python/keywords.h"
-#include "python/known_files.h"
-#include "python/run.h"
 
 namespace krot::internal {
 namespace {
@@ -30,7 +29,6 @@ namespace {
 namespace py = pybind11;
 
 using ModelPointer = std::shared_ptr<Model>;
-using ConstModelPointer = std::shared_ptr<const Model>;
 
 // Receives the stage, the largest error or None, and the lower bound or None.
 using Progress = std::function<void(const std::string&, std::optional<double>,
@@ -43,9 +41,61 @@ struct Outcome {
   std::optional<std::string> certificate;
 };
 
-OptionTable TableOf(const std::string& function) {
-  return {function, "", "docs/cli.md"};
+// How often Python's signal handlers are called.
+constexpr std::chrono::milliseconds kBetweenLooks(50);
+
+// Runs `work` on a thread of its own with the GIL released, and watches for
+// Ctrl-C. On Ctrl-C it cancels the work, waits until it ends, and throws what
+// the signal raises. Rethrows exceptions of `work`. The caller must hold the
+// GIL, and holds it again at the end.
+void RunInterruptibly(const std::function<void(const CancelFlag&)>& work) {
+  CancelFlag cancel(false);
+  std::future<void> done =
+      std::async(std::launch::async, [&] { work(cancel); });
+  bool is_interrupted = false;
+  for (;;) {
+    {
+      const py::gil_scoped_release release;
+      if (done.wait_for(kBetweenLooks) == std::future_status::ready) break;
+    }
+    if (!is_interrupted && PyErr_CheckSignals() != 0) {
+      is_interrupted = true;
+      cancel = true;
+      // The error is kept until the work has ended, because its callbacks may
+      // need Python.
+      const py::error_already_set error;
+      {
+        const py::gil_scoped_release release;
+        done.wait();
+      }
+      throw error;
+    }
+  }
+  done.get();
 }
+
+// A command as it runs: its keywords and options, what it finds out, and how
+// long it takes.
+struct Command {
+  explicit Command(const std::string& function)
+      : table(function, "", "docs/cli.md") {}
+
+  // Runs `work`, which Ctrl-C ends, and records its end.
+  template <typename Work>
+  void Run(const Work& work) {
+    RunInterruptibly([&](const CancelFlag& cancel) {
+      context.cancel = &cancel;
+      work();
+    });
+    RecordEnd(timer, context.num_threads, &run);
+  }
+
+  const Timer timer;
+  OptionTable table;
+  Context context;
+  KnownFiles known;
+  RunRecord run;
+};
 
 // Reports progress to Python. The callbacks take the GIL, which the call itself
 // has released.
@@ -65,143 +115,129 @@ void Follow(const Progress& progress, SolveModelOptions* options) {
   };
 }
 
-Outcome RunSolve(const ConstModelPointer& model, TolerantSolveOptions options,
-                 Context context, const Progress& progress,
-                 const std::string& command, const RunRecord& run,
-                 const std::optional<PositionFrame>& position_frame = {},
-                 bool writes_own_frame = false) {
-  const Timer timer;
+Outcome OutcomeOf(Model model, std::string report,
+                  std::optional<std::string> certificate = {}) {
+  return {std::make_shared<Model>(std::move(model)), std::move(report),
+          std::move(certificate)};
+}
+
+Outcome RunSolve(Command* command, const Model& model,
+                 TolerantSolveOptions options, const Progress& progress,
+                 SolveReport report) {
   Follow(progress, &options.solve);
   options.solve.describe_certificate = true;
   TolerantSolveResult result;
-  RunInterruptibly([&](const CancelFlag& cancel) {
-    context.cancel = &cancel;
-    result = SolveTolerantly(*model, options, context);
-  });
-  SolveReport report;
-  report.run = run;
-  RecordEnd(timer, context.num_threads, &report.run);
-  report.command = command;
+  command->Run(
+      [&] { result = SolveTolerantly(model, options, command->context); });
+  report.run = command->run;
   report.method = MethodName(result.summary.method);
   report.summary = std::move(result.summary);
   report.outliers = std::move(result.outliers);
-  report.position_frame = position_frame;
-  if (writes_own_frame) result.model = InPositionFrame(result.model, &report);
-  Outcome outcome{std::make_shared<Model>(std::move(result.model)),
-                  SolveJson(report), std::nullopt};
-  if (report.summary.certificate) {
-    outcome.certificate = CertificateJson(*report.summary.certificate);
+  if (report.position_frame && command->known.writes_own_frame()) {
+    result.model = InPositionFrame(result.model, &report);
   }
-  return outcome;
+  std::optional<std::string> certificate;
+  if (report.summary.certificate) {
+    certificate = CertificateJson(*report.summary.certificate);
+  }
+  return OutcomeOf(std::move(result.model), SolveJson(report),
+                   std::move(certificate));
 }
 
 Outcome SolveCommand(const ModelPointer& model, const Progress& progress,
                      const py::dict& keywords) {
+  Command command("pykrot.solve");
   TolerantSolveOptions options;
-  Context context;
-  OptionTable table = TableOf("pykrot.solve");
-  AddSolverOptions(&options, &context, &table);
-  KnownFiles known;
-  known.AddRotationsTo(&table);
-  known.AddFixedTo(&table);
-  known.AddPositionsTo(&table);
-  AssignKeywords(keywords, &table);
-  ResolveSolverOptions(table, &options.solve);
-  RunRecord run;
-  const ConstModelPointer input = known.WithRotations(model, &run);
-  options.solve.problem.fixed = known.Fixed(*input);
-  KnownPositions positions = known.Positions(*input);
+  AddSolverOptions(&options, &command.context, &command.table);
+  command.known.AddRotationsTo(&command.table);
+  command.known.AddFixedTo(&command.table);
+  command.known.AddPositionsTo(&command.table);
+  AssignKeywords(keywords, &command.table);
+  ResolveSolverOptions(command.table, &options.solve);
+  const auto input = command.known.WithRotations(model, &command.run);
+  options.solve.problem.fixed = command.known.Fixed(*input);
+  KnownPositions positions = command.known.Positions(*input);
   options.solve.problem.positions = std::move(positions.positions);
-  options.has_other_rotations = run.rotations.has_value();
-  return RunSolve(input, options, context, progress, "solver", run,
-                  positions.frame, known.writes_own_frame());
+  options.has_other_rotations = command.run.rotations.has_value();
+  SolveReport report;
+  report.command = "solver";
+  report.position_frame = std::move(positions.frame);
+  return RunSolve(&command, *input, options, progress, std::move(report));
 }
 
 Outcome TriangulateCommand(const ModelPointer& model, const Progress& progress,
                            const py::dict& keywords) {
+  Command command("pykrot.triangulate");
   TolerantSolveOptions options;
-  Context context;
-  OptionTable table = TableOf("pykrot.triangulate");
-  AddSolveOptions(&options.solve, &context, &table);
-  AssignKeywords(keywords, &table);
-  CheckSolveOptions(options.solve, table);
+  AddSolveOptions(&options.solve, &command.context, &command.table);
+  AssignKeywords(keywords, &command.table);
+  CheckSolveOptions(options.solve, command.table);
   options.solve = PointsOnly(options.solve);
-  return RunSolve(model, options, context, progress, "point_triangulator", {});
+  SolveReport report;
+  report.command = "point_triangulator";
+  return RunSolve(&command, *model, options, progress, std::move(report));
 }
 
 Outcome FilterCommand(const ModelPointer& model, const Progress& progress,
                       const py::dict& keywords) {
-  const Timer timer;
+  Command command("pykrot.filter");
   OutlierFilterOptions options;
-  Context context;
-  OptionTable table = TableOf("pykrot.filter");
-  AddOutlierFilterOptions(&options, &context, &table);
-  KnownFiles known;
-  known.AddRotationsTo(&table);
-  AssignKeywords(keywords, &table);
-  ResolveOutlierFilterOptions(table, false, &options);
-  OutlierReport report;
-  const ConstModelPointer input = known.WithRotations(model, &report.run);
+  AddOutlierFilterOptions(&options, &command.context, &command.table);
+  command.known.AddRotationsTo(&command.table);
+  AssignKeywords(keywords, &command.table);
+  ResolveOutlierFilterOptions(command.table, false, &options);
+  const auto input = command.known.WithRotations(model, &command.run);
   Follow(progress, &options.solve);
   OutlierFilterResult result;
-  RunInterruptibly([&](const CancelFlag& cancel) {
-    context.cancel = &cancel;
-    result = FilterOutliers(*input, options, context);
-  });
-  RecordEnd(timer, context.num_threads, &report.run);
-  report.summary = std::move(result.summary);
-  Outcome outcome{std::make_shared<Model>(std::move(result.model)),
-                  OutlierJson(report), std::nullopt};
+  command.Run(
+      [&] { result = FilterOutliers(*input, options, command.context); });
+  const OutlierReport report = {command.run, std::move(result.summary)};
+  std::optional<std::string> certificate;
   if (report.summary.conflicts) {
-    outcome.certificate = ConflictJson(*report.summary.conflicts);
+    certificate = ConflictJson(*report.summary.conflicts);
   }
-  return outcome;
+  return OutcomeOf(std::move(result.model), OutlierJson(report),
+                   std::move(certificate));
 }
 
 // Returns the cured model.
 Outcome CheckModelCommand(const ModelPointer& model, const Progress&,
                           const py::dict& keywords) {
-  const Timer timer;
-  Context context;
-  OptionTable table = TableOf("pykrot.check");
-  table.AddThreads("num_threads", &context.num_threads,
-                   "the result is the same, bit by bit");
-  KnownFiles known;
-  known.AddDatabaseTo(&table);
-  AssignKeywords(keywords, &table);
-  const std::optional<Database> database = known.Matches(*model);
+  Command command("pykrot.check");
+  command.table.AddThreads("num_threads", &command.context.num_threads,
+                           "the result is the same, bit by bit");
+  command.known.AddDatabaseTo(&command.table);
+  AssignKeywords(keywords, &command.table);
+  const std::optional<Database> database = command.known.Matches(*model);
   ModelCheckOptions options;
   if (database) options.database = &*database;
   CheckReport report;
   report.num_observations = static_cast<int64_t>(model->track_elements.size());
-  Model cured;
-  RunInterruptibly([&](const CancelFlag& cancel) {
-    context.cancel = &cancel;
-    report.check = CheckModel(*model, options, context);
-    ModelCure cure = CureModel(*model, report.check, options, context);
-    cured = std::move(cure.model);
-    report.moved = std::move(cure.moved);
+  ModelCure cure;
+  command.Run([&] {
+    report.check = CheckModel(*model, options, command.context);
+    cure = CureModel(*model, report.check, options, command.context);
+    report.seconds_check = command.timer.Seconds();
+    report.pixel_error_before = Summarize(PixelErrors(*model));
+    report.pixel_error_after = Summarize(PixelErrors(cure.model));
   });
-  report.seconds_check = timer.Seconds();
-  report.pixel_error_before = Summarize(PixelErrors(*model));
-  report.pixel_error_after = Summarize(PixelErrors(cured));
-  RecordEnd(timer, context.num_threads, &report.run);
-  return {std::make_shared<Model>(std::move(cured)), CheckJson(report),
-          std::nullopt};
+  report.run = command.run;
+  report.moved = std::move(cure.moved);
+  return OutcomeOf(std::move(cure.model), CheckJson(report));
 }
 
 Outcome AdjustCommand(const ModelPointer& model, const Progress& progress,
                       const py::dict& keywords) {
-  const Timer timer;
+  Command command("pykrot.bundle_adjust");
+  KnownFiles& known = command.known;
   AdjustmentOptions given;
-  OptionTable table = TableOf("pykrot.bundle_adjust");
-  given.AddTo(&table);
-  KnownFiles known;
-  known.AddFixedTo(&table);
-  known.AddPositionsTo(&table);
-  known.AddDistancesTo(&table);
-  AssignKeywords(keywords, &table);
-  AdjustModelOptions options = given.Resolve(table);
+  given.AddTo(&command.table);
+  known.AddFixedTo(&command.table);
+  known.AddPositionsTo(&command.table);
+  known.AddDistancesTo(&command.table);
+  AssignKeywords(keywords, &command.table);
+  AdjustModelOptions options = given.Resolve(command.table);
+  command.context.num_threads = given.num_threads();
   Model input = *model;
   options.adjustment.fixed = known.Fixed(input);
   const Survey survey(known.Positions(input), known.writes_own_frame(), &input);
@@ -212,50 +248,42 @@ Outcome AdjustCommand(const ModelPointer& model, const Progress& progress,
   options.adjustment.distances = distances.distances();
   Follow(progress, &options.start);
   AdjustModelResult result;
-  RunInterruptibly([&](const CancelFlag& cancel) {
-    result = AdjustModel(input, options, {given.num_threads(), &cancel});
-  });
+  command.Run([&] { result = AdjustModel(input, options, command.context); });
   AdjustmentReport report;
-  RecordEnd(timer, given.num_threads(), &report.run);
+  report.run = command.run;
   report.summary = std::move(result.summary);
   report.positions = survey.ComparePositions(result.model);
   report.position_frame = survey.frame();
   report.is_in_position_frame = survey.is_in_own_frame();
   report.distances = distances.Compare(result.model, report.summary);
   std::string json = AdjustmentJson(report, result.model);
-  return {std::make_shared<Model>(std::move(result.model)), std::move(json),
-          std::nullopt};
+  return OutcomeOf(std::move(result.model), std::move(json));
 }
 
 Outcome ToleranceCommand(const ModelPointer& model, const Progress& progress,
                          const py::dict& keywords) {
-  const Timer timer;
+  Command command("pykrot.tolerances");
   ToleranceArguments arguments;
-  Context context;
-  OptionTable table = TableOf("pykrot.tolerances");
-  AddToleranceOptions(&arguments, &context, &table);
-  KnownFiles known;
-  known.AddRotationsTo(&table);
-  known.AddFixedTo(&table);
-  AssignKeywords(keywords, &table);
-  ToleranceReport report;
-  const ConstModelPointer input = known.WithRotations(model, &report.run);
+  AddToleranceOptions(&arguments, &command.context, &command.table);
+  command.known.AddRotationsTo(&command.table);
+  command.known.AddFixedTo(&command.table);
+  AssignKeywords(keywords, &command.table);
+  const auto input = command.known.WithRotations(model, &command.run);
   ToleranceOptions options = ResolveToleranceOptions(arguments, *input);
-  options.solve.problem.fixed = known.Fixed(*input);
+  options.solve.problem.fixed = command.known.Fixed(*input);
   Follow(progress, &options.solve);
+  ToleranceReport report;
   ToleranceResult result;
-  RunInterruptibly([&](const CancelFlag& cancel) {
-    context.cancel = &cancel;
-    result = AnalyzeTolerances(*input, options, context);
-    report.pixel_error_before =
-        Summarize(PixelErrors(*input, context.num_threads));
+  command.Run([&] {
+    result = AnalyzeTolerances(*input, options, command.context);
+    const int num_threads = command.context.num_threads;
+    report.pixel_error_before = Summarize(PixelErrors(*input, num_threads));
     report.pixel_error_after =
-        Summarize(PixelErrors(result.model, context.num_threads));
+        Summarize(PixelErrors(result.model, num_threads));
   });
-  RecordEnd(timer, context.num_threads, &report.run);
+  report.run = command.run;
   report.summary = std::move(result.summary);
-  return {std::make_shared<Model>(std::move(result.model)),
-          ToleranceJson(report), std::nullopt};
+  return OutcomeOf(std::move(result.model), ToleranceJson(report));
 }
 
 // The report as JSON; none if the models share too little to be aligned.
@@ -264,7 +292,7 @@ std::optional<std::string> CompareCommand(const ModelPointer& model1,
                                           const std::string& alignment,
                                           int num_worst) {
   CompareModelsOptions options;
-  OptionTable table = TableOf("pykrot.compare");
+  OptionTable table("pykrot.compare", "", "docs/cli.md");
   table.AddNamed<AlignmentKind>("alignment", &options.alignment,
                                 {{"frame", AlignmentKind::kFrame},
                                  {"similarity", AlignmentKind::kSimilarity},

@@ -1,4 +1,5 @@
-// pykrot.Model.
+// pykrot._core: KROT's commands for Python, which exchange models without
+// files. Here are pykrot.Model, and the module.
 
 #include <filesystem>
 #include <memory>
@@ -11,8 +12,10 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include "krot/adjust/bundle_adjustment.h"
 #include "krot/analysis/model_input.h"
 #include "krot/analysis/noise.h"
+#include "krot/base/write_file.h"
 #include "krot/context.h"
 #include "krot/geometry.h"
 #include "krot/model.h"
@@ -20,7 +23,8 @@
 #include "krot/model/rigs.h"
 #include "krot/options/option_table.h"
 #include "krot/report/sentences.h"
-#include "python/bindings.h"
+#include "krot/version.h"
+#include "python/keywords.h"
 #include "python/model_arrays.h"
 
 namespace krot::internal {
@@ -191,8 +195,6 @@ py::dict Noise(const Model& model, double false_alarm,
   return result;
 }
 
-}  // namespace
-
 void BindModel(py::module_* module) {
   py::class_<Model, std::shared_ptr<Model>>(*module, "Model")
       .def_static("read", &Read, py::arg("path"), py::kw_only(),
@@ -231,4 +233,18 @@ void BindModel(py::module_* module) {
            py::arg("relative_sigmas") = std::vector<double>());
 }
 
+}  // namespace
 }  // namespace krot::internal
+
+PYBIND11_MODULE(_core, module) {
+  namespace py = pybind11;
+  krot::internal::SilenceCeres();
+  module.attr("__version__") = KROT_VERSION;
+  py::register_exception<krot::ModelError>(module, "ModelError",
+                                           PyExc_ValueError);
+  py::register_exception<krot::internal::OptionError>(module, "OptionError",
+                                                      PyExc_ValueError);
+  py::register_exception<krot::WriteError>(module, "WriteError", PyExc_OSError);
+  krot::internal::BindModel(&module);
+  krot::internal::BindCommands(&module);
+}
