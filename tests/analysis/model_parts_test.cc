@@ -1,4 +1,4 @@
-#include "krot/analysis/model_parts.h"
+#include "krot/analysis/noise.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -10,7 +10,6 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/analysis/noise.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model.h"
 #include "krot/model/derived_models.h"

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/model_parts.h"
+#include "krot/analysis/noise.h"
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"
 #include "krot/model/model_io.h"

@@ -8,7 +8,7 @@
 #include "krot/database.h"
 #include "krot/options/command_options.h"
 #include "krot/outliers/match_tracks.h"
-#include "krot/report/pair_report.h"
+#include "krot/report/reports.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/command.h"
 #include "tools/krot/interrupt.h"

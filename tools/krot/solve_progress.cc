@@ -10,7 +10,7 @@ namespace krot::internal {
 namespace {
 
 // Errors of exact models are near 0.
-std::string Pixels(double value) {
+std::string ErrorText(double value) {
   return (value >= 0.01 ? FormatNumber(value, 4) : Scientific(value)) + " px";
 }
 
@@ -58,7 +58,7 @@ void SolveProgress::Follow(SolveModelOptions* options, Context* context) {
 
 Progress SolveProgress::Describe(int sweep, const Sweep& state) {
   return {"sweeps",
-          "sweep " + std::to_string(sweep) + ": cost " + Pixels(state.cost) +
+          "sweep " + std::to_string(sweep) + ": cost " + ErrorText(state.cost) +
               ", " + FormatNumber(state.seconds, 2) + " s",
           SweepFraction(sweep, state.cost)};
 }
@@ -68,14 +68,14 @@ Progress SolveProgress::Describe(int iteration, const JointIteration& state) {
   const std::string name = "iteration " + std::to_string(iteration) + ": ";
   const std::string seconds = ", " + FormatNumber(state.seconds, 2) + " s";
   if (state.target) {
-    return {
-        "start",
-        name + "looking for a start below " + Pixels(*state.target) + seconds,
-        std::nullopt};
+    return {"start",
+            name + "looking for a start below " + ErrorText(*state.target) +
+                seconds,
+            std::nullopt};
   }
   return {"iterations",
-          name + "cost " + Pixels(*state.cost) +
-              (state.lower_bound ? ", proved " + Pixels(*state.lower_bound)
+          name + "cost " + ErrorText(*state.cost) +
+              (state.lower_bound ? ", proved " + ErrorText(*state.lower_bound)
                                  : std::string()) +
               ", gap ~" + Scientific(*state.gap) + seconds,
           IterationFraction(state)};

@@ -14,7 +14,6 @@
 #include "krot/camera/camera_model.h"
 #include "krot/model/rigs.h"
 #include "krot/report/html_page.h"
-#include "krot/report/pair_report.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/photo.h"
 

@@ -6,6 +6,7 @@
 #include <tuple>
 #include <unordered_map>
 
+#include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
 #include "krot/geometry.h"
 #include "krot/geometry/transform.h"
@@ -158,21 +159,17 @@ class TrackIndex {
  public:
   explicit TrackIndex(const Model& model)
       : model_(model),
-        points_(model.track_elements.size()),
+        points_(PointsOfElements(model)),
         others_(model.track_elements.size()) {
     for (const Image& image : model.images) {
       elements_.emplace_back(image.points2D.size());
     }
     const std::vector<int32_t> image_of = ImagesOfElements(model);
-    for (size_t k = 0; k < model.points3D.size(); ++k) {
-      const Point3D& point = model.points3D[k];
-      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-        std::optional<uint64_t>& last =
-            elements_[image_of[e]][model.track_elements[e].point2D_idx];
-        others_[e] = last;
-        last = e;
-        points_[e] = static_cast<int32_t>(k);
-      }
+    for (uint64_t e = 0; e < image_of.size(); ++e) {
+      std::optional<uint64_t>& last =
+          elements_[image_of[e]][model.track_elements[e].point2D_idx];
+      others_[e] = last;
+      last = e;
     }
   }
 
@@ -196,7 +193,7 @@ class TrackIndex {
  private:
   const Model& model_;
   std::vector<std::vector<std::optional<uint64_t>>> elements_;
-  std::vector<int32_t> points_;
+  const std::vector<int32_t> points_;
   std::vector<std::optional<uint64_t>> others_;
 };
 

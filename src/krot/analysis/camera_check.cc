@@ -7,7 +7,6 @@
 
 #include <Eigen/Core>
 
-#include "krot/analysis/pose_rows.h"
 #include "krot/base/numbers.h"
 #include "krot/geometry/transform.h"
 #include "krot/linear/reduced_camera_system.h"
@@ -65,14 +64,6 @@ struct GainSystem {
   MatrixXd D;
   VectorXd g;
 };
-
-Matrix3d RootOf(const std::vector<PoseRow>& rows) {
-  Matrix3d H = Matrix3d::Zero();
-  for (const PoseRow& row : rows) {
-    H.noalias() += row.F.rightCols<3>().transpose() * row.F.rightCols<3>();
-  }
-  return RootOfInverse(H);
-}
 
 // Eliminates the points and then the poses of frames from the normal equations
 // with the columns of cameras.
@@ -145,7 +136,7 @@ class PoseElimination {
     const std::vector<SharedGroup>& groups = shared_.groups();
     MatrixXd& D = of_cameras_.D;
     VectorXd& g = of_cameras_.g;
-    const Matrix3d root = RootOf(rows);
+    const Matrix3d root = PoseRows::RootOf(rows);
     std::vector<int32_t> nodes;
     for (const PoseRow& row : rows) {
       nodes.push_back(2 * FrameOf(row));
@@ -292,7 +283,7 @@ class CameraChecker {
     for (size_t k = 0; k < model_.points3D.size(); ++k) {
       const std::vector<PoseRow> rows = rows_.Of(k);
       if (rows.empty()) continue;
-      const Matrix3d root = RootOf(rows);
+      const Matrix3d root = PoseRows::RootOf(rows);
       of_track.clear();
       for (const PoseRow& row : rows) {
         lengths.push_back(row.x_cam.norm());

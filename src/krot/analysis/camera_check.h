@@ -1,12 +1,105 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "krot/analysis/noise.h"
 #include "krot/check.h"
 #include "krot/model.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
+
+// An observation at the least squares of its track.
+struct PoseRow {
+  uint64_t element = 0;  // in Model::track_elements
+  int32_t image = 0;
+  Eigen::Vector3d x_cam;
+  Eigen::Vector2d error;  // projected - measured, pixels
+  // By the camera's rotation (from the left) and centre. The derivative by the
+  // point is minus that by the centre.
+  Eigen::Matrix<double, 2, 6> F;
+};
+
+// The observations of each track that `noise` tests, as it fits them.
+class PoseRows {
+ public:
+  // Keeps references. Requires a valid model. O(observations).
+  PoseRows(const Model& model, const ModelNoise& noise);
+
+  // Of point k; empty if fewer than two are left.
+  std::vector<PoseRow> Of(size_t k) const;
+
+  const std::vector<ImageGeometry>& geometries() const { return geometries_; }
+
+  // G with G G' = H^+, H being the information of the rows about their point.
+  static Eigen::Matrix3d RootOf(const std::vector<PoseRow>& rows);
+
+ private:
+  const Model& model_;
+  const ModelNoise& noise_;
+  const std::vector<ImageGeometry> geometries_;
+  const std::vector<int32_t> image_of_;  // by track element
+  std::vector<double> nearest_;  // distance of a point, by image; scene units
+};
+
+// What images share of a camera, and may be wrong with it: columns of the
+// derivatives that are freed together.
+struct SharedGroup {
+  int32_t camera = 0;  // index in Model::cameras
+  int32_t rig = -1;    // index in Model::rigs, of kPlaceInRig
+  CameraFault fault = CameraFault::kFocalLength;
+  std::vector<int> params;  // indices in Camera::params
+  Eigen::Index begin = 0;   // the first column
+  Eigen::Index size = 0;
+  int64_t num_images = 0;
+  // As in ImageSums, over the camera's images.
+  int64_t num_directions = 0;
+  double square = 0;
+};
+
+// The derivatives of an observation by the columns of a group. No camera model
+// has more parameters.
+struct ByGroup {
+  int32_t group;
+  Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 16> C;
+};
+
+// The focal length, principal point and distortion of every camera with an
+// image plane, and the place of every camera in its rig but for the reference
+// sensor's.
+class SharedColumns {
+ public:
+  // Keeps references. `sums` are AddUpImages of the model.
+  SharedColumns(const Model& model,
+                const std::vector<ImageGeometry>& geometries,
+                const std::vector<ImageSums>& sums);
+
+  const std::vector<SharedGroup>& groups() const { return groups_; }
+  Eigen::Index num_columns() const { return num_columns_; }
+
+  // Leaves only these groups their columns.
+  void Keep(const std::vector<char>& is_kept);
+
+  // By the columns of the groups that have some. A camera in a rig turns about
+  // its centre, which moves in the rig. Derivatives by the lens are
+  // central differences.
+  std::vector<ByGroup> ByGroups(const PoseRow& row) const;
+
+ private:
+  void AddLenses();
+  void AddPlaces();
+  void Number();
+
+  const Model& model_;
+  const std::vector<ImageGeometry>& geometries_;
+  std::vector<SharedGroup> groups_;
+  std::vector<std::vector<int32_t>> groups_of_camera_;
+  std::vector<int32_t> place_of_image_;  // -1: a reference sensor
+  Eigen::Index num_columns_ = 0;
+};
 
 // Finds cameras whose focal length, principal point, distortion or place in
 // the rig is wrong: freeing it lowers the sum of squared errors of the camera's

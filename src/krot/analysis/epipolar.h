@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -63,19 +65,26 @@ class MatchRays {
     return world_from_cam * ray;
   }
 
-  // Calls visit(ray1, ray2), in camera axes, for each match of a pair whose
-  // pixels have rays.
-  template <typename Visit>
-  void ForEach(const VerifiedPair& pair, const Visit& visit) const {
-    const Camera& camera1 = model_.cameras[geometries[pair.image1].camera];
-    const Camera& camera2 = model_.cameras[geometries[pair.image2].camera];
-    for (const auto& [keypoint1, keypoint2] : pair.matches) {
-      const auto ray1 =
-          RayOf(camera1, database_.keypoints[pair.image1][keypoint1]);
-      const auto ray2 =
-          RayOf(camera2, database_.keypoints[pair.image2][keypoint2]);
-      if (ray1 && ray2) visit(*ray1, *ray2);
-    }
+  // The rays of a match, in camera axes; none unless both pixels have rays.
+  std::optional<std::pair<PixelRay, PixelRay>> Of(
+      const VerifiedPair& pair, const std::array<uint32_t, 2>& match) const {
+    const auto ray = [&](int32_t image, uint32_t keypoint) {
+      return RayOf(model_.cameras[geometries[image].camera],
+                   database_.keypoints[image][keypoint]);
+    };
+    const auto ray1 = ray(pair.image1, match[0]);
+    const auto ray2 = ray(pair.image2, match[1]);
+    if (!ray1 || !ray2) return std::nullopt;
+    return std::pair(*ray1, *ray2);
+  }
+
+  // The same as a condition on the baseline of a pair whose images have poses.
+  std::optional<EpipolarMatch> ConditionOf(
+      const VerifiedPair& pair, const std::array<uint32_t, 2>& match) const {
+    const auto rays = Of(pair, match);
+    if (!rays) return std::nullopt;
+    return EpipolarMatch(World(rays->first, pair.image1),
+                         World(rays->second, pair.image2));
   }
 
   const std::vector<ImageGeometry> geometries;  // as Model::images

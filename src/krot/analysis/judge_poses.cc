@@ -276,11 +276,13 @@ class PoseJudge {
                          static_cast<double>(checked.num_explained));
       }
       begin.push_back(matches.size());
-      rays_.ForEach(database_.pairs[p], [&](const PixelRay& ray1,
-                                            const PixelRay& ray2) {
-        matches.push_back({is_first ? ray1 : ray2,
-                           rays_.World(is_first ? ray2 : ray1, other), center});
-      });
+      for (const auto& match : database_.pairs[p].matches) {
+        auto rays = rays_.Of(database_.pairs[p], match);
+        if (!rays) continue;
+        if (!is_first) std::swap(rays->first, rays->second);
+        matches.push_back(
+            {rays->first, rays_.World(rays->second, other), center});
+      }
     }
     PoseFits fits;
     begin.push_back(matches.size());

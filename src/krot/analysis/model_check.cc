@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "krot/analysis/camera_check.h"
-#include "krot/analysis/model_parts.h"
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
@@ -307,16 +306,13 @@ class Checker {
     check_.sigma_px = snooping_.noise.sigma_px;
     check_.cauchy_scale_px = snooping_.noise.cauchy_scale_px;
     check_.critical_w = snooping_.noise.critical_w;
-    std::vector<Point3DId> point_of;
-    for (const Point3D& point : model_.points3D) {
-      point_of.insert(point_of.end(), point.track_end - point.track_begin,
-                      point.id);
-    }
+    const std::vector<int32_t> point_of = PointsOfElements(model_);
     for (const SnoopedObservation& one : snooping_.removed) {
       const TrackElement& element = model_.track_elements[one.element];
       check_.observations.push_back({one.element, element.image_id,
                                      model_.images[image_of_[one.element]].name,
-                                     element.point2D_idx, point_of[one.element],
+                                     element.point2D_idx,
+                                     model_.points3D[point_of[one.element]].id,
                                      one.w, one.error_px, one.is_of_two});
     }
     check_.points = snooping_.noise.points;

@@ -228,4 +228,58 @@ RotationInput TakeRotations(const FileBytes& file, Model* model,
   return input;
 }
 
+std::string NameOf(const Model& model, const KnownPosition& position) {
+  return position.of == KnownPosition::Of::kImage
+             ? model.images[position.index].name
+             : "3D point " + std::to_string(model.points3D[position.index].id);
+}
+
+std::optional<Eigen::Vector3d> PlaceOf(const Model& model,
+                                       const std::vector<ImageGeometry>& images,
+                                       const KnownPosition& position) {
+  if (position.of == KnownPosition::Of::kPoint3D) {
+    return model.points3D[position.index].xyz;
+  }
+  const ImageGeometry& image = images[position.index];
+  if (!image.has_pose) return std::nullopt;
+  return Center(image.cam_from_world);
+}
+
+std::vector<KnownPosition> InOwnFrame(const PositionFrame& frame) {
+  const Similarity& own_from_model = frame.own_from_model;
+  std::vector<KnownPosition> positions = frame.positions;
+  for (KnownPosition& position : positions) {
+    Ellipsoid& region = position.region;
+    region.centre = own_from_model * region.centre;
+    region.semi_axes *= own_from_model.scale;
+    region.world_from_axes =
+        Eigen::Quaterniond(own_from_model.rotation) * region.world_from_axes;
+  }
+  return positions;
+}
+
+KnownPositions ReadKnownPositions(const PositionFiles& files,
+                                  const Model& model, const FileNote& on_note) {
+  const PositionsOptions options{files.radius, on_note, files.have_own_frame};
+  KnownPositions known;
+  if (!files.of_cameras.empty()) {
+    const FileBytes file = ReadFileBytes(files.of_cameras);
+    known.positions = options.has_own_frame && IsDatabase(file)
+                          ? ReadPosePriors(files.of_cameras, model, options)
+                          : ReadPositions(file, model, options);
+  }
+  if (!files.of_points.empty()) {
+    const std::vector<KnownPosition> of_points =
+        ReadPointPositions(ReadFileBytes(files.of_points), model, options);
+    known.positions.insert(known.positions.end(), of_points.begin(),
+                           of_points.end());
+  }
+  if (!options.has_own_frame) return known;
+  known.frame = FindPositionFrame(
+      model, known.positions,
+      files.of_cameras.empty() ? files.of_points : files.of_cameras);
+  known.positions = known.frame->positions;
+  return known;
+}
+
 }  // namespace krot::internal

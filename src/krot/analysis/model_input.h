@@ -12,6 +12,7 @@
 #include "krot/model.h"
 #include "krot/model/model_checks.h"
 #include "krot/model/model_io.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 
@@ -75,6 +76,11 @@ struct WrongPosition {
 };
 
 std::string NameOf(const Model& model, const KnownPosition& position);
+
+// Where the model has it; none if that is not known.
+std::optional<Eigen::Vector3d> PlaceOf(const Model& model,
+                                       const std::vector<ImageGeometry>& images,
+                                       const KnownPosition& position);
 
 struct PositionFrame {
   Similarity own_from_model;

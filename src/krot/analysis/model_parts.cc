@@ -1,4 +1,4 @@
-#include "krot/analysis/model_parts.h"
+#include "krot/analysis/noise.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,6 @@
 
 #include <Eigen/Core>
 
-#include "krot/analysis/noise.h"
 #include "krot/base/disjoint_sets.h"
 #include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
@@ -249,13 +248,10 @@ class PartFinder {
         model_.images[n].points2D[model_.track_elements[e].point2D_idx];
     const RigidTransform& pose = geometries_[n].cam_from_world;
     const Vector3d x_cam = pose * noise_.points[k];
-    const auto E = RowAtProjection(model_.cameras[geometries_[n].camera],
-                                   {pixel.x, pixel.y}, x_cam);
-    if (!E) return Matrix3d::Zero();
-    const double depth = E->row(0).dot(x_cam);
-    const Eigen::Matrix<double, 2, 3> J =
-        (E->bottomRows<2>() - E->bottomRows<2>() * x_cam / depth * E->row(0)) /
-        depth * pose.rotation;
+    const auto projected =
+        DifferentiateError(model_.cameras[geometries_[n].camera], pixel, x_cam);
+    if (!projected) return Matrix3d::Zero();
+    const Eigen::Matrix<double, 2, 3> J = projected->by_cam * pose.rotation;
     if (!J.allFinite()) return Matrix3d::Zero();
     return J.transpose() * J;
   }

@@ -11,6 +11,7 @@
 
 #include <Eigen/Geometry>
 
+#include "krot/analysis/noise.h"
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
@@ -113,37 +114,27 @@ std::vector<CameraErrors> ErrorsByCamera(const Model& model,
 
 std::vector<WorstObservation> WorstObservations(
     const Model& model, const std::vector<double>& errors_px, int count) {
-  struct Candidate {
-    size_t element;
-    size_t point;
-  };
-  std::vector<Candidate> candidates;
-  for (size_t k = 0; k < model.points3D.size(); ++k) {
-    const Point3D& point = model.points3D[k];
-    for (size_t e = point.track_begin; e < point.track_end; ++e) {
-      if (std::isfinite(errors_px[e])) candidates.push_back({e, k});
-    }
+  std::vector<size_t> elements;
+  for (size_t e = 0; e < errors_px.size(); ++e) {
+    if (std::isfinite(errors_px[e])) elements.push_back(e);
   }
   const size_t num_listed =
-      std::min(candidates.size(), static_cast<size_t>(count));
-  std::partial_sort(candidates.begin(), candidates.begin() + num_listed,
-                    candidates.end(),
-                    [&](const Candidate& a, const Candidate& b) {
-                      if (errors_px[a.element] != errors_px[b.element]) {
-                        return errors_px[a.element] > errors_px[b.element];
-                      }
-                      return a.element < b.element;
+      std::min(elements.size(), static_cast<size_t>(count));
+  std::partial_sort(elements.begin(), elements.begin() + num_listed,
+                    elements.end(), [&](size_t a, size_t b) {
+                      return std::pair(-errors_px[a], a) <
+                             std::pair(-errors_px[b], b);
                     });
-  candidates.resize(num_listed);
+  elements.resize(num_listed);
 
-  const std::unordered_map<ImageId, int32_t> indices = ImageIndices(model);
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
+  const std::vector<int32_t> point_of = PointsOfElements(model);
   std::vector<WorstObservation> worst;
-  for (const Candidate& candidate : candidates) {
-    const TrackElement& element = model.track_elements[candidate.element];
-    worst.push_back({element.image_id,
-                     model.images[indices.at(element.image_id)].name,
-                     element.point2D_idx, model.points3D[candidate.point].id,
-                     errors_px[candidate.element]});
+  for (const size_t e : elements) {
+    const TrackElement& element = model.track_elements[e];
+    worst.push_back({element.image_id, model.images[image_of[e]].name,
+                     element.point2D_idx, model.points3D[point_of[e]].id,
+                     errors_px[e]});
   }
   return worst;
 }

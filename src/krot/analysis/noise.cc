@@ -5,12 +5,14 @@
 #include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Eigenvalues>
 
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {
@@ -280,6 +282,33 @@ NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
   if (!is_most_left(result)) result = Snooper(model, held, context).Snoop();
   result.has_common_noise = false;
   return result;
+}
+
+// P(chi^2 > 2 x) = exp(-x) sum x^i / i!, and for Beta(j, m) P(> s) =
+// (1 - s)^m sum (m + i - 1 over i) s^i, with j terms each.
+double GainExponent(double gain, double square, int64_t num_directions,
+                    int num_parameters, double sigma_px) {
+  const double num_terms = (num_parameters + 1) / 2;
+  const double m = static_cast<double>(num_directions) / 2 - num_terms;
+  if (!(m > 0) || !(gain > 0)) return 0;
+  const double x = gain / (2 * sigma_px * sigma_px);
+  const double share = std::min(gain / square, 1 - 1e-12);
+  double by_model = 1, model_term = 1, by_own = 1, own_term = 1;
+  for (double i = 1; i < num_terms; ++i) {
+    by_model += model_term *= x / i;
+    by_own += own_term *= (m + i - 1) / i * share;
+  }
+  return std::min(x - std::log(by_model),
+                  -m * std::log1p(-share) - std::log(by_own));
+}
+
+double SuccessExponent(int64_t num_successes, int64_t num_trials, double p) {
+  if (num_successes == 0) return 0;
+  const auto num = static_cast<double>(num_trials);
+  const double s = static_cast<double>(num_successes) / num;
+  if (s <= p) return 0;
+  const double failures = s < 1 ? (1 - s) * std::log((1 - s) / (1 - p)) : 0;
+  return num * (s * std::log(s / p) + failures);
 }
 
 }  // namespace krot::internal

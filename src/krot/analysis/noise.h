@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -68,8 +69,21 @@ double CriticalW(int64_t num_tested, double false_alarm,
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
                          const Context& context);
 
+// The error of an observation that sees x_cam, in camera axes, and its
+// derivatives by x_cam.
+struct DifferentiatedError {
+  Eigen::Vector2d error;  // pixels
+  Eigen::Matrix<double, 2, 3> by_cam;
+};
+// None if RowAtProjection has none.
+std::optional<DifferentiatedError> DifferentiateError(
+    const Camera& camera, const Point2D& pixel, const Eigen::Vector3d& x_cam);
+
 // A point nearer than this lies in its camera; scene units.
 double LeastDistance(const std::vector<ImageGeometry>& geometries);
+
+// For each track element the index of its point.
+std::vector<int32_t> PointsOfElements(const Model& model);
 
 // All tracks of a model, each fitted by itself with the cameras as they stand,
 // and which of their observations take part.
@@ -122,7 +136,7 @@ class TrackNoise {
   std::vector<View> views_;    // as Model::images
   double least_distance_ = 0;  // a nearer point is in the camera; scene units
   const std::vector<int32_t> image_of_;  // by track element
-  std::vector<int32_t> point_of_;
+  const std::vector<int32_t> point_of_;  // by track element
   std::vector<char> takes_part_;
   std::vector<ObservationNoise> observations_;
   std::vector<double> squared_errors_;
@@ -215,5 +229,40 @@ double SuccessExponent(int64_t num_successes, int64_t num_trials, double p);
 // The sums of each image, over the observations that are tested according to
 // `noise`. Requires a valid model. O(observations).
 std::vector<ImageSums> AddUpImages(const Model& model, const ModelNoise& noise);
+
+// ---- Parts ----
+
+// What no adjustment of a model mends.
+struct LastingFaults {
+  // Observations whose point lies in their camera (ObservationNoise::w).
+  int64_t num_in_camera = 0;
+  // Sets of frames that tracks join, and the images outside the largest one.
+  // Frames without tracks are in none.
+  int32_t num_parts = 0;
+  int64_t num_images_outside = 0;
+  int64_t num_images = 0;  // in all parts
+};
+// Requires a valid model. O(observations).
+LastingFaults FindLastingFaults(const Model& model);
+
+// The parts of a model that too few tracks tie to the rest, the most images
+// first. Tracks are those that `noise` tests, as it fits them; sigma_px must be
+// known. A maximum spanning tree joins frames by the tracks that they share.
+// Where cutting it gives a part of two frames or more that is not tied by many
+// tracks which several frames of both sides see, ModelPart::center_sigma is
+// found for it.
+//
+// To first order: a part moves as a whole, with its points, by a similarity
+// about its centre o, so by K (t, omega, s) at x with K = (I, -[x - o]x, x -
+// o). Of a track with the information H_a of the part's observations about the
+// point and H_b of the others', the point eliminated,
+//
+//   K' H_a (H_a + H_b)^-1 H_b K
+//
+// is what it says about the part, and sigma^2 times the inverse of their sum is
+// the covariance. Requires a valid model. O(sum of squared track lengths), and
+// O(observations) for each part that is not tied by many tracks.
+std::vector<ModelPart> FindLooseParts(const Model& model,
+                                      const ModelNoise& noise);
 
 }  // namespace krot::internal

@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <utility>
+#include <random>
 
 #include <Eigen/Eigenvalues>
 
-#include "krot/analysis/frame_search.h"
+#include "krot/analysis/model_comparison.h"
 #include "krot/base/numbers.h"
-#include "krot/context.h"
 #include "krot/geometry/transform.h"
 #include "krot/model/rigs.h"
 
@@ -18,6 +17,170 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+// In units of the median distance: one of a thousand Gaussian errors in three
+// dimensions is farther off.
+constexpr double kFarByMedian = 2.6;
+constexpr int kMaxRefits = 20;
+
+// A known position, and where the model places it. `pose.center1` is the
+// position, relative to the median of all positions; `pose.center2` is the
+// model's place, relative to the median of all places.
+struct FramePair {
+  size_t index = 0;
+  PosePair pose;
+  Matrix3d unit_from_own = Matrix3d::Identity();
+};
+
+// The similarity that fits these pairs best; none if it is not determined.
+std::optional<Similarity> FitTo(const std::vector<FramePair>& pairs) {
+  std::vector<PosePair> poses;
+  for (const FramePair& pair : pairs) poses.push_back(pair.pose);
+  const std::optional<Similarity> fit = AlignCenters(poses);
+  return fit && fit->scale > 0 ? fit : std::nullopt;
+}
+
+// The model's place, taken to the positions' frame, minus the position.
+Vector3d OffsetAt(const Similarity& own_from_model, const FramePair& pair) {
+  return own_from_model * pair.pose.center2 - pair.pose.center1;
+}
+
+// Distances in radii, or in the positions' unit where radii are unknown.
+std::vector<double> MisfitsOf(const std::vector<FramePair>& pairs,
+                              const Similarity& own_from_model) {
+  std::vector<double> misfits;
+  for (const FramePair& pair : pairs) {
+    misfits.push_back(
+        (pair.unit_from_own * OffsetAt(own_from_model, pair)).norm());
+  }
+  return misfits;
+}
+
+std::vector<FramePair> Within(const std::vector<FramePair>& pairs,
+                              const Similarity& own_from_model,
+                              double tolerance) {
+  const std::vector<double> misfits = MisfitsOf(pairs, own_from_model);
+  std::vector<FramePair> within;
+  for (size_t n = 0; n < pairs.size(); ++n) {
+    if (misfits[n] <= tolerance) within.push_back(pairs[n]);
+  }
+  return within;
+}
+
+// How well a similarity fits the positions; a lower score is better.
+struct Judgement {
+  double score = kInfinity;
+  double tolerance = 1;  // misfits below it agree
+};
+
+Judgement JudgeByRadii(std::vector<double> misfits) {
+  Judgement judgement{0, 1};
+  for (const double misfit : misfits) {
+    judgement.score += std::min(misfit * misfit, 1.0);
+  }
+  return judgement;
+}
+
+// The score is the misfit that a majority does not exceed: at least four where
+// there are as many, since any three places nearly fit.
+Judgement JudgeBySpread(std::vector<double> misfits) {
+  const size_t count =
+      std::max(misfits.size() / 2 + 1, std::min<size_t>(misfits.size(), 4));
+  std::nth_element(misfits.begin(), misfits.begin() + (count - 1),
+                   misfits.end());
+  return {misfits[count - 1], kFarByMedian * misfits[count - 1]};
+}
+
+class FrameSearch {
+ public:
+  using Judge = Judgement (*)(std::vector<double>);
+
+  FrameSearch(const std::vector<FramePair>& pairs, Judge judge)
+      : pairs_(pairs), judge_(judge) {}
+
+  // None if all triples are on a line.
+  std::optional<Similarity> Run() {
+    constexpr int64_t kMostTriples = 50'000;
+    const size_t n = pairs_.size();
+    if (n * (n - 1) / 2 * (n - 2) / 3 <= kMostTriples) {
+      for (size_t a = 0; a < n; ++a) {
+        for (size_t b = a + 1; b < n; ++b) {
+          for (size_t c = b + 1; c < n; ++c) Try(a, b, c);
+        }
+      }
+    } else {
+      std::mt19937_64 generator(1);
+      for (int64_t triple = 0; triple < kMostTriples; ++triple) {
+        const size_t a = generator() % n;
+        const size_t b = generator() % n;
+        const size_t c = generator() % n;
+        if (a != b && b != c && c != a) Try(a, b, c);
+      }
+    }
+    return best_;
+  }
+
+ private:
+  void Try(size_t a, size_t b, size_t c) {
+    const auto found = FitTo({pairs_[a], pairs_[b], pairs_[c]});
+    if (found && Take(*found)) Refine();
+  }
+
+  bool Take(const Similarity& own_from_model) {
+    const Judgement judgement = judge_(MisfitsOf(pairs_, own_from_model));
+    if (!(judgement.score < judgement_.score)) return false;
+    judgement_ = judgement;
+    best_ = own_from_model;
+    return true;
+  }
+
+  // Fits the positions that agree with the best similarity, within the
+  // tolerance or twice that, as three places say less than all of them.
+  void Refine() {
+    for (int refit = 0; refit < kMaxRefits; ++refit) {
+      bool is_better = false;
+      for (const double factor : {2.0, 1.0}) {
+        const auto refined =
+            FitTo(Within(pairs_, *best_, factor * judgement_.tolerance));
+        if (refined) is_better |= Take(*refined);
+      }
+      if (!is_better) return;
+    }
+  }
+
+  const std::vector<FramePair>& pairs_;
+  const Judge judge_;
+  Judgement judgement_;
+  std::optional<Similarity> best_;
+};
+
+// At most 300 pairs, always the same.
+std::vector<FramePair> Sample(std::vector<FramePair> pairs) {
+  constexpr size_t kMostScored = 300;
+  if (pairs.size() <= kMostScored) return pairs;
+  std::mt19937_64 generator(2);
+  for (size_t n = 0; n < kMostScored; ++n) {
+    std::swap(pairs[n], pairs[n + generator() % (pairs.size() - n)]);
+  }
+  pairs.resize(kMostScored);
+  return pairs;
+}
+
+// By consensus within the radii or, where these are unknown or no majority
+// agrees, by the least median. None if all triples are on a line.
+std::optional<Similarity> SearchFrame(const std::vector<FramePair>& pairs,
+                                      bool has_radii) {
+  const std::vector<FramePair> sample = Sample(pairs);
+  if (has_radii) {
+    const auto found = FrameSearch(sample, JudgeByRadii).Run();
+    if (!found) return std::nullopt;
+    const auto agreeing = Within(sample, *found, 1);
+    if (2 * agreeing.size() > sample.size() && agreeing.size() >= 3) {
+      return found;
+    }
+  }
+  return FrameSearch(sample, JudgeBySpread).Run();
+}
 
 // The variances of the model's places along their principal axes, ascending.
 Vector3d PrincipalVariances(const std::vector<FramePair>& pairs) {
@@ -64,9 +227,9 @@ class FrameFinder {
 
   [[noreturn]] void FailOnLine(double beside) const {
     Fail("found positions on one line" +
-         (beside > 0 ? ", to " + LengthText(beside) + " and their scatter,"
-                     : std::string(",")) +
-         " about which the model may be turned at will, expected some beside "
+         (beside > 0 ? ", to " + LengthText(beside) + " and their scatter"
+                     : "") +
+         ", about which the model may be turned at will, expected some beside "
          "it; --point_positions_path adds those of points");
   }
 
@@ -75,17 +238,12 @@ class FrameFinder {
     std::vector<Vector3d> own, in_model;
     for (size_t n = 0; n < positions_.size(); ++n) {
       const KnownPosition& position = positions_[n];
+      const auto place = PlaceOf(model_, geometries, position);
+      if (!place || !place->allFinite()) continue;
       FramePair pair;
       pair.index = n;
       pair.pose.center1 = position.region.centre;
-      if (position.of == KnownPosition::Of::kPoint3D) {
-        pair.pose.center2 = model_.points3D[position.index].xyz;
-      } else if (geometries[position.index].has_pose) {
-        pair.pose.center2 = Center(geometries[position.index].cam_from_world);
-      } else {
-        continue;
-      }
-      if (!pair.pose.center2.allFinite()) continue;
+      pair.pose.center2 = *place;
       if (position.region.semi_axes.minCoeff() > 0) {
         pair.unit_from_own = position.region.UnitFromWorld();
         pair.pose.weight = pair.unit_from_own.squaredNorm();
@@ -233,53 +391,10 @@ class FrameFinder {
 
 }  // namespace
 
-std::string NameOf(const Model& model, const KnownPosition& position) {
-  return position.of == KnownPosition::Of::kImage
-             ? model.images[position.index].name
-             : "3D point " + std::to_string(model.points3D[position.index].id);
-}
-
-std::vector<KnownPosition> InOwnFrame(const PositionFrame& frame) {
-  const Similarity& own_from_model = frame.own_from_model;
-  std::vector<KnownPosition> positions = frame.positions;
-  for (KnownPosition& position : positions) {
-    Ellipsoid& region = position.region;
-    region.centre = own_from_model * region.centre;
-    region.semi_axes *= own_from_model.scale;
-    region.world_from_axes =
-        Eigen::Quaterniond(own_from_model.rotation) * region.world_from_axes;
-  }
-  return positions;
-}
-
 PositionFrame FindPositionFrame(const Model& model,
                                 const std::vector<KnownPosition>& positions,
                                 const std::string& source) {
   return FrameFinder(model, positions, source).Run();
-}
-
-KnownPositions ReadKnownPositions(const PositionFiles& files,
-                                  const Model& model, const FileNote& on_note) {
-  const PositionsOptions options{files.radius, on_note, files.have_own_frame};
-  KnownPositions known;
-  if (!files.of_cameras.empty()) {
-    const FileBytes file = ReadFileBytes(files.of_cameras);
-    known.positions = options.has_own_frame && IsDatabase(file)
-                          ? ReadPosePriors(files.of_cameras, model, options)
-                          : ReadPositions(file, model, options);
-  }
-  if (!files.of_points.empty()) {
-    const std::vector<KnownPosition> of_points =
-        ReadPointPositions(ReadFileBytes(files.of_points), model, options);
-    known.positions.insert(known.positions.end(), of_points.begin(),
-                           of_points.end());
-  }
-  if (!options.has_own_frame) return known;
-  known.frame = FindPositionFrame(
-      model, known.positions,
-      files.of_cameras.empty() ? files.of_points : files.of_cameras);
-  known.positions = known.frame->positions;
-  return known;
 }
 
 }  // namespace krot::internal

@@ -49,6 +49,17 @@ double LeastDistance(const std::vector<ImageGeometry>& geometries) {
                          : 1e-9 * MedianDistance(centres, MedianPlace(centres));
 }
 
+std::optional<DifferentiatedError> DifferentiateError(const Camera& camera,
+                                                      const Point2D& pixel,
+                                                      const Vector3d& x_cam) {
+  const auto E = RowAtProjection(camera, {pixel.x, pixel.y}, x_cam);
+  if (!E) return std::nullopt;
+  const double depth = E->row(0).dot(x_cam);
+  const Vector2d error = E->bottomRows<2>() * x_cam / depth;
+  return DifferentiatedError{error,
+                             (E->bottomRows<2>() - error * E->row(0)) / depth};
+}
+
 // Fits a point in homogeneous coordinates, so that one at infinity, or beyond
 // by the noise of its rays, is like any other. The origin is the first camera,
 // the unit its distance from the farthest one.
@@ -86,14 +97,12 @@ class TrackNoise::Track {
         view.cam_from_world_rotation * (X.head<3>() - X[3] * c);
     const Point2D& pixel =
         view.image->points2D[all_.model_.track_elements[e].point2D_idx];
-    const auto E = RowAtProjection(*view.camera, {pixel.x, pixel.y}, x_cam);
-    if (!E) return std::nullopt;
-    const double depth = E->row(0).dot(x_cam);
+    const auto projected = DifferentiateError(*view.camera, pixel, x_cam);
+    if (!projected) return std::nullopt;
     Row row;
-    row.error = E->bottomRows<2>() * x_cam / depth;
+    row.error = projected->error;
     const Eigen::Matrix<double, 2, 3> by_world =
-        (E->bottomRows<2>() - row.error * E->row(0)) / depth *
-        view.cam_from_world_rotation;
+        projected->by_cam * view.cam_from_world_rotation;
     row.J = by_world * (basis.topRows<3>() - c * basis.row(3));
     if (!all_.relative_sigmas_.empty()) {
       row.error /= all_.relative_sigmas_[e];
@@ -247,6 +256,7 @@ TrackNoise::TrackNoise(const Model& model,
     : model_(model),
       relative_sigmas_(relative_sigmas),
       image_of_(ImagesOfElements(model)),
+      point_of_(PointsOfElements(model)),
       takes_part_(model.track_elements.size(), 0),
       observations_(model.track_elements.size()),
       squared_errors_(model.track_elements.size(), 0),
@@ -268,11 +278,6 @@ TrackNoise::TrackNoise(const Model& model,
     takes_part_[e] = views_[image_of_[e]].camera != nullptr;
     observations_[e] = NotTested(kNaN);
   }
-  for (size_t k = 0; k < model.points3D.size(); ++k) {
-    const Point3D& point = model.points3D[k];
-    point_of_.insert(point_of_.end(), point.track_end - point.track_begin,
-                     static_cast<int32_t>(k));
-  }
 }
 
 void TrackNoise::Fit(int64_t k) { Track(this, k).Run(); }
@@ -291,6 +296,17 @@ Vector2d TrackNoise::ErrorOf(uint64_t e) const {
              *view.camera, {pixel.x, pixel.y},
              view.cam_from_world_rotation * (X.head<3>() - X[3] * view.center))
       .value_or(Vector2d::Constant(kNaN));
+}
+
+std::vector<int32_t> PointsOfElements(const Model& model) {
+  std::vector<int32_t> point_of(model.track_elements.size());
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    const Point3D& point = model.points3D[k];
+    std::fill(point_of.begin() + static_cast<int64_t>(point.track_begin),
+              point_of.begin() + static_cast<int64_t>(point.track_end),
+              static_cast<int32_t>(k));
+  }
+  return point_of;
 }
 
 Vector3d TrackNoise::Point(int64_t k) const {

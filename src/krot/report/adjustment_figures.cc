@@ -13,7 +13,6 @@
 #include "krot/model/model_io.h"
 #include "krot/model/rigs.h"
 #include "krot/report/report_json.h"
-#include "krot/report/reports.h"
 
 namespace krot::internal {
 
@@ -122,35 +121,28 @@ std::string DatumName(AdjustmentDatum datum) {
 }
 
 Json NumbersJson(const Eigen::VectorXd& values) {
-  Json list = Json::array();
-  for (const double value : values) list.push_back(FiniteOrNull(value));
-  return list;
+  return ListJson(values, [](double value) { return value; });
 }
 
 // The rows of a matrix; null if it is not known.
 template <typename Matrix>
 Json CovarianceJson(const std::optional<Matrix>& covariance) {
   if (!covariance) return nullptr;
-  Json rows = Json::array();
-  for (Eigen::Index r = 0; r < covariance->rows(); ++r) {
-    rows.push_back(NumbersJson(covariance->row(r)));
-  }
-  return rows;
+  return ListJson(covariance->rowwise(), NumbersJson);
 }
 
 Json ObservationsJson(const std::vector<NamedObservation>& observations,
                       double sigma0_px) {
   return ListJson(observations, [&](const NamedObservation& o) -> Json {
-    return {
-        {"image_id", o.image->id},
-        {"image_name", o.image->name},
-        {"point2D_idx", o.point2D_idx},
-        {"point3D_id", o.point3D_id},
-        {"residual", NumbersJson(o.precision->residual_px)},
-        {"error", o.error_px},
-        {"redundancy", NumbersJson(o.precision->redundancy)},
-        {"w", FiniteOrNull(o.w)},
-        {"smallest_detectable_error", FiniteOrNull(o.DetectablePx(sigma0_px))}};
+    return {{"image_id", o.image->id},
+            {"image_name", o.image->name},
+            {"point2D_idx", o.point2D_idx},
+            {"point3D_id", o.point3D_id},
+            {"residual", NumbersJson(o.precision->residual_px)},
+            {"error", o.error_px},
+            {"redundancy", NumbersJson(o.precision->redundancy)},
+            {"w", o.w},
+            {"smallest_detectable_error", o.DetectablePx(sigma0_px)}};
   });
 }
 
@@ -159,7 +151,7 @@ Json ObservationsJson(const std::vector<NamedObservation>& observations,
 nlohmann::ordered_json SurveyJson(const std::optional<SurveyComparison>& survey,
                                   bool are_points) {
   if (!survey) return nullptr;
-  Json places = ListJson(survey->places, [&](const auto& place) -> Json {
+  Json places = ListJson(survey->places, [&](const auto& place) {
     Json json = are_points ? Json{{"point3D_id", place.point3D_id}}
                            : Json{{"name", place.name}};
     json["surveyed"] = VectorJson(place.surveyed);
@@ -173,59 +165,48 @@ nlohmann::ordered_json SurveyJson(const std::optional<SurveyComparison>& survey,
 nlohmann::ordered_json PrecisionJson(const AdjustmentPrecision& precision,
                                      const Model& model) {
   const PrecisionFigures figures(precision, model);
-  Json cameras = Json::array(), images = Json::array(), rays = Json::object(),
-       angles = Json::array();
-  for (const CameraPrecision& one : precision.cameras) {
+  const auto of_camera = [&](const CameraPrecision& one) -> Json {
     const Camera& camera = model.cameras[one.camera];
-    Json names = Json::array(), values = Json::array();
-    for (const int n : one.params) {
-      names.push_back(ParamNames(camera.model_id)[n]);
-      values.push_back(camera.params[n]);
-    }
-    cameras.push_back({{"camera_id", camera.id},
-                       {"params", names},
-                       {"values", values},
-                       {"covariance", CovarianceJson(one.covariance)}});
-  }
-  for (const ImagePrecision& one : precision.images) {
-    images.push_back({{"image_id", model.images[one.image].id},
-                      {"name", model.images[one.image].name},
-                      {"num_observations", one.num_observations},
-                      {"rms", NumbersJson(one.rms_px)},
-                      {"max", one.max_px},
-                      {"covariance", CovarianceJson(one.covariance)}});
-  }
+    const std::vector<std::string> names = ParamNames(camera.model_id);
+    return {{"camera_id", camera.id},
+            {"params", ListJson(one.params, [&](int n) { return names[n]; })},
+            {"values",
+             ListJson(one.params, [&](int n) { return camera.params[n]; })},
+            {"covariance", CovarianceJson(one.covariance)}};
+  };
+  const auto of_image = [&](const ImagePrecision& one) -> Json {
+    return {{"image_id", model.images[one.image].id},
+            {"name", model.images[one.image].name},
+            {"num_observations", one.num_observations},
+            {"rms", NumbersJson(one.rms_px)},
+            {"max", one.max_px},
+            {"covariance", CovarianceJson(one.covariance)}};
+  };
+  const auto of_angle = [&](const PointPrecision& point) {
+    return Joined({{"point3D_id", model.points3D[point.point].id}},
+                  KROT_JSON_OF(point, num_rays, angle_deg));
+  };
+  Json json = {{"is_least_squares", precision.is_least_squares},
+               {"datum", DatumName(precision.datum)}};
+  json.update(KROT_JSON_OF(precision, num_unknowns, datum_defect,
+                           num_undetermined, num_points_in_cameras,
+                           redundancy));
+  json["sigma0"] = precision.sigma0_px;
+  json["cameras"] = ListJson(precision.cameras, of_camera);
+  json["images"] = ListJson(precision.images, of_image);
+  Json& rays = json["rays"] = Json::object();
   for (const auto& [num_rays, num_points] : figures.num_with_rays) {
     rays[std::to_string(num_rays)] = num_points;
   }
-  for (const PointPrecision& point : figures.SmallestAngles()) {
-    angles.push_back({{"point3D_id", model.points3D[point.point].id},
-                      {"num_rays", point.num_rays},
-                      {"angle_deg", point.angle_deg}});
-  }
-  return {
-      {"is_least_squares", precision.is_least_squares},
-      {"datum", DatumName(precision.datum)},
-      {"num_unknowns", precision.num_unknowns},
-      {"datum_defect", precision.datum_defect},
-      {"num_undetermined", precision.num_undetermined},
-      {"num_points_in_cameras", precision.num_points_in_cameras},
-      {"redundancy", precision.redundancy},
-      {"sigma0", FiniteOrNull(precision.sigma0_px)},
-      {"cameras", cameras},
-      {"images", images},
-      {"rays", rays},
-      {"mean_angle_deg", figures.mean_angle_deg},
-      {"smallest_angles", angles},
-      {"points_sigma_rms", NumbersJson(figures.RmsSigma())},
-      {"median_smallest_detectable_error",
-       FiniteOrNull(figures.MedianDetectablePx())},
-      {"num_uncontrolled", figures.num_uncontrolled},
-      {"critical_w", FiniteOrNull(figures.critical_w)},
-      {"num_above", figures.num_above},
-      {"largest_residuals",
-       ObservationsJson(figures.LargestResiduals(), precision.sigma0_px)},
-      {"largest_w", ObservationsJson(figures.LargestW(), precision.sigma0_px)}};
+  json["mean_angle_deg"] = figures.mean_angle_deg;
+  json["smallest_angles"] = ListJson(figures.SmallestAngles(), of_angle);
+  json["points_sigma_rms"] = NumbersJson(figures.RmsSigma());
+  json["median_smallest_detectable_error"] = figures.MedianDetectablePx();
+  json.update(KROT_JSON_OF(figures, num_uncontrolled, critical_w, num_above));
+  json["largest_residuals"] =
+      ObservationsJson(figures.LargestResiduals(), precision.sigma0_px);
+  json["largest_w"] = ObservationsJson(figures.LargestW(), precision.sigma0_px);
+  return json;
 }
 
 std::optional<SurveyComparison> CompareWithSurvey(
@@ -236,20 +217,16 @@ std::optional<SurveyComparison> CompareWithSurvey(
   std::vector<PosePair> pairs;
   std::vector<Eigen::Matrix3d> deviations_of;  // of differences
   for (const KnownPosition& position : surveyed) {
+    const auto in_model = PlaceOf(model, images, position);
+    if (!in_model) continue;
     PosePair pair;
     pair.center1 = position.region.centre;
-    SurveyComparison::Place place;
+    pair.center2 = *in_model;
+    SurveyComparison::Place& place = survey.places.emplace_back();
     place.name = NameOf(model, position);
     if (position.of == KnownPosition::Of::kPoint3D) {
-      const Point3D& point = model.points3D[position.index];
-      pair.center2 = point.xyz;
-      place.point3D_id = point.id;
-    } else if (images[position.index].has_pose) {
-      pair.center2 = Center(images[position.index].cam_from_world);
-    } else {
-      continue;
+      place.point3D_id = model.points3D[position.index].id;
     }
-    survey.places.push_back(std::move(place));
     pairs.push_back(pair);
     deviations_of.push_back(kRegionSigmas * position.region.UnitFromWorld());
   }

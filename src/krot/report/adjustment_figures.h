@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <nlohmann/json_fwd.hpp>
 
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/analysis/model_input.h"
@@ -79,6 +80,12 @@ Eigen::VectorXd Deviations(const Eigen::MatrixXd& covariance);
 // The names of a camera model's parameters: "f", "cx", "cy", "k".
 std::vector<std::string> ParamNames(int model_id);
 
+// The precision for report.json: sigma0, redundancy, standard deviations and
+// reliability.
+nlohmann::ordered_json PrecisionJson(const AdjustmentPrecision& precision,
+                                     const Model& model);
+std::string PrecisionSentence(const AdjustmentPrecision& precision);
+
 // ---- What is surveyed ----
 
 // Surveyed points and cameras, compared with those of a model.
@@ -106,6 +113,10 @@ struct SurveyComparison {
 std::optional<SurveyComparison> CompareWithSurvey(
     const Model& model, const std::vector<KnownPosition>& surveyed,
     const std::optional<Similarity>& survey_from_model = {});
+
+// For report.json; null if there are none.
+nlohmann::ordered_json SurveyJson(const std::optional<SurveyComparison>& survey,
+                                  bool are_points);
 
 // The known positions of a bundle adjustment, and in which frame it is done.
 class Survey {

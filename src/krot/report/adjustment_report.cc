@@ -12,20 +12,12 @@
 namespace krot::internal {
 namespace {
 
-Json AdjustmentIterationsJson(
-    const std::vector<BundleAdjustmentIteration>& iterations) {
-  return ListJson(iterations,
-                  [&](const BundleAdjustmentIteration& iteration) -> Json {
-                    return {{"cost", iteration.cost},
-                            {"is_successful", iteration.is_successful},
-                            {"barrier", NumberOrNull(iteration.barrier)},
-                            {"cap", NumberOrNull(iteration.cap)},
-                            {"seconds", iteration.seconds}};
-                  });
+Json AdjustmentIterationJson(const BundleAdjustmentIteration& iteration) {
+  return KROT_JSON_OF(iteration, cost, is_successful, barrier, cap, seconds);
 }
 
 std::string AdjustmentErrorTable(const AdjustModelSummary& summary) {
-  std::vector<std::string> head = {"pixels", "before"};
+  Row head = {"pixels", "before"};
   std::vector<PixelErrorStatistics> estimates = {summary.pixel_error_before};
   if (summary.start) {
     head.push_back("start");
@@ -33,8 +25,7 @@ std::string AdjustmentErrorTable(const AdjustModelSummary& summary) {
   }
   head.push_back("after");
   estimates.push_back(summary.pixel_error_after);
-  TextTable table;
-  table.AddRow(head);
+  TextTable table(head);
   AddErrorColumns(estimates, &table);
   return table.ToString();
 }
@@ -55,8 +46,8 @@ std::string AdjustmentEndSentence(const BundleAdjustmentSummary& summary) {
   std::string after = " after " + Counted(summary.num_iterations, "iteration");
   if (summary.first_loss_scale) {
     after += ", the first of them with a loss scale of " +
-             FormatNumber(*summary.first_loss_scale, 2) +
-             " px, the median error of the start";
+             Pixels(*summary.first_loss_scale, 2) +
+             ", the median error of the start";
   }
   switch (summary.termination) {
     case BundleAdjustmentTermination::kConverged:
@@ -112,7 +103,7 @@ std::string CapSentence(const AdjustModelSummary& summary) {
 Json KnownPositionsJson(const AdjustmentReport& report) {
   Json json = SurveyJson(report.positions, false);
   if (json.is_null()) return json;
-  json["sigma_px"] = NumberOrNull(report.summary.adjustment.sigma_px);
+  json["sigma_px"] = report.summary.adjustment.sigma_px;
   json["frame"] =
       PositionFrameJson(report.position_frame, report.is_in_position_frame);
   return json;
@@ -129,8 +120,8 @@ std::string KnownPositionsSentence(const AdjustmentReport& report) {
       [](const auto& a, const auto& b) { return a.deviations < b.deviations; });
   return Counted(summary.num_positions, "known position") +
          " took part, beside noise of " +
-         FormatNumber(summary.sigma_px.value_or(1), 3) +
-         " px per axis: the model is " + FormatLength(report.positions->rms) +
+         Pixels(summary.sigma_px.value_or(1), 3) + " per axis: the model is " +
+         FormatLength(report.positions->rms) +
          " off (RMS, in the positions' unit), farthest " + farthest->name +
          ", by " + FormatNumber(farthest->deviations, 1) +
          " standard deviations.";
@@ -200,67 +191,52 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
   if (summary.precision) text << PrecisionSentence(*summary.precision) << '\n';
   if (report.distances) text << AdjustedDistanceTable(*report.distances);
   text << LastingFaultLines(report.faults);
-  std::string adjusted;
-  if (summary.start) {
-    adjusted = "found a start in " +
-               FormatNumber(StartSeconds(*summary.start), 2) + " s, ";
-  }
-  adjusted += "adjusted " + FormatNumber(adjustment.seconds, 2) + " s";
-  text << RunSentence(report.run, adjusted);
+  text << RunSentence(
+      report.run,
+      (summary.start
+           ? "found a start in " + Seconds(StartSeconds(*summary.start)) + ", "
+           : "") +
+          "adjusted " + Seconds(adjustment.seconds));
   return text.str();
 }
 
 std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
   const AdjustModelSummary& summary = report.summary;
   const BundleAdjustmentSummary& adjustment = summary.adjustment;
-  // Null unless there was a solve below the cap.
-  Json start_bound, start_seconds;
-  Json is_lowest;  // null unless a lowest maximum was asked for
-  if (adjustment.lowest_max_error) {
-    is_lowest = adjustment.is_lowest_max_error_converged;
-  }
-  Json precision;  // null unless it was asked for
-  if (summary.precision) precision = PrecisionJson(*summary.precision, model);
-  if (summary.start) {
-    start_bound = NumberOrNull(summary.start->lower_bound);
-    start_seconds = StartSeconds(*summary.start);
-  }
-  const Json json = {
+  const auto precision_of = [&](const AdjustmentPrecision& precision) {
+    return PrecisionJson(precision, model);
+  };
+  Json json = {
       {"version", report.run.version},
       {"command", "bundle_adjuster"},
-      {"termination", AdjustmentTerminationName(adjustment.termination)},
-      {"num_frames", adjustment.num_frames},
-      {"num_images", adjustment.num_images},
-      {"num_points", adjustment.num_points},
-      {"num_observations", adjustment.num_observations},
-      {"num_parameters", adjustment.num_parameters},
-      {"left_out", LeftOutJson(LeftOutBy(adjustment))},
-      {"cost_initial", adjustment.cost_initial},
-      {"cost_final", adjustment.cost_final},
-      {"num_iterations", adjustment.num_iterations},
-      {"iterations", AdjustmentIterationsJson(adjustment.iterations)},
-      {"first_loss_scale", NumberOrNull(adjustment.first_loss_scale)},
-      {"linear_solver", adjustment.linear_solver},
-      {"stationarity", NumberOrNull(adjustment.stationarity)},
-      {"max_error", NumberOrNull(summary.max_error)},
-      {"lowest_max_error", NumberOrNull(adjustment.lowest_max_error)},
-      {"is_lowest_max_error_converged", is_lowest},
-      {"duality_gap", NumberOrNull(adjustment.duality_gap)},
-      {"num_active", adjustment.num_active},
-      {"start_lower_bound", start_bound},
-      {"pixel_error",
-       {{"before", ErrorJson(summary.pixel_error_before)},
-        {"start", ErrorJson(summary.pixel_error_start)},
-        {"after", ErrorJson(summary.pixel_error_after)}}},
-      {"precision", precision},
-      {"check_points", SurveyJson(report.check_points, true)},
-      {"positions", KnownPositionsJson(report)},
-      {"distances", AdjustedDistancesJson(report.distances)},
-      {"num_in_camera", report.faults.num_in_camera},
-      {"num_parts", report.faults.num_parts},
-  };
+      {"termination", AdjustmentTerminationName(adjustment.termination)}};
+  json.update(KROT_JSON_OF(adjustment, num_frames, num_images, num_points,
+                           num_observations, num_parameters));
+  json["left_out"] = LeftOutJson(LeftOutBy(adjustment));
+  json.update(
+      KROT_JSON_OF(adjustment, cost_initial, cost_final, num_iterations));
+  json["iterations"] = ListJson(adjustment.iterations, AdjustmentIterationJson);
+  json.update(
+      KROT_JSON_OF(adjustment, first_loss_scale, linear_solver, stationarity));
+  json["max_error"] = summary.max_error;
+  json["lowest_max_error"] = adjustment.lowest_max_error;
+  json.update(KnownIf(adjustment.lowest_max_error.has_value(),
+                      KROT_JSON_OF(adjustment, is_lowest_max_error_converged)));
+  json.update(KROT_JSON_OF(adjustment, duality_gap, num_active));
+  // Null unless there was a solve below the cap.
+  json["start_lower_bound"] =
+      summary.start ? summary.start->lower_bound : std::nullopt;
+  json["pixel_error"] = {{"before", ErrorJson(summary.pixel_error_before)},
+                         {"start", ErrorJson(summary.pixel_error_start)},
+                         {"after", ErrorJson(summary.pixel_error_after)}};
+  json["precision"] = JsonIf(summary.precision, precision_of);
+  json["check_points"] = SurveyJson(report.check_points, true);
+  json["positions"] = KnownPositionsJson(report);
+  json["distances"] = AdjustedDistancesJson(report.distances);
+  json.update(KROT_JSON_OF(report.faults, num_in_camera, num_parts));
   return ReportText(json, report.run,
-                    {{"start", start_seconds}, {"adjust", adjustment.seconds}});
+                    {{"start", JsonIf(summary.start, StartSeconds)},
+                     {"adjust", adjustment.seconds}});
 }
 
 }  // namespace krot::internal

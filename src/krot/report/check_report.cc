@@ -5,30 +5,25 @@
 #include <vector>
 
 #include "krot/base/numbers.h"
-#include "krot/report/pair_report.h"
 #include "krot/report/text_table.h"
 
 namespace krot::internal {
 namespace {
 
 std::string NoiseWords(const ModelCheck& check) {
-  return check.sigma_px
-             ? "noise of " + FormatNumber(*check.sigma_px, 3) + " px per axis" +
-                   (check.median_scale_px ? " at the median keypoint scale"
-                                          : "")
-             : "noise";
+  if (!check.sigma_px) return "noise";
+  return "noise of " + Pixels(*check.sigma_px, 3) + " per axis" +
+         TextIf(check.median_scale_px.has_value(),
+                " at the median keypoint scale");
 }
-
-std::string Are(int64_t count) { return count == 1 ? " is " : " are "; }
 
 // The images with this verdict: wrong ones by the number of their wrong
 // observations, weakly held ones by how weakly they are held.
 std::vector<const ImageCheck*> ImagesOf(const ModelCheck& check,
                                         ImageVerdict verdict) {
-  std::vector<const ImageCheck*> images;
-  for (const ImageCheck& image : check.images) {
-    if (image.verdict == verdict) images.push_back(&image);
-  }
+  auto images = PointersIf(check.images, [&](const ImageCheck& image) {
+    return image.verdict == verdict;
+  });
   if (verdict == ImageVerdict::kWeaklyHeld) {
     SortLargestFirst(&images, &ImageCheck::relative_center_sigma);
   } else {
@@ -42,77 +37,65 @@ std::string ImageTable(const ModelCheck& check, ImageVerdict verdict,
   const std::vector<const ImageCheck*> images = ImagesOf(check, verdict);
   if (images.empty()) return "";
   const bool is_wrong = verdict == ImageVerdict::kWrong;
-  TextTable table;
-  if (is_wrong) {
-    table.AddRow(
-        {"image", "observations", "checked", "more than noise", "why"});
-  } else {
-    table.AddRow({"image", "observations", "checked", "more than noise",
-                  "centre +-", "median image's x", "turn +-, degrees"});
+  Row head = {"image", "observations", "checked", "more than noise"};
+  for (const char* more :
+       is_wrong ? std::vector<const char*>{"why"}
+                : std::vector<const char*>{"centre +-", "median image's x",
+                                           "turn +-, degrees"}) {
+    head.push_back(more);
   }
-  for (size_t n = 0; n < std::min(images.size(), max_rows); ++n) {
-    const ImageCheck& image = *images[n];
-    std::vector<std::string> row = {
-        image.name, std::to_string(image.num_observations),
-        std::to_string(image.num_tested), std::to_string(image.num_wrong)};
+  const auto row = [&](const ImageCheck* image) {
+    Row cells = {image->name, image->num_observations, image->num_tested,
+                 image->num_wrong};
     if (is_wrong) {
-      row.push_back(ReasonOf(check, image));
+      cells.push_back(ReasonOf(check, *image));
     } else {
-      row.push_back(SigmaText(image.center_sigma));
-      row.push_back(std::isfinite(image.relative_center_sigma)
-                        ? FormatNumber(image.relative_center_sigma, 1)
-                        : "-");
-      row.push_back(SigmaText(image.turn_sigma_deg));
+      cells.push_back(SigmaText(image->center_sigma));
+      cells.push_back(FormatNumber(image->relative_center_sigma, 1));
+      cells.push_back(SigmaText(image->turn_sigma_deg));
     }
-    table.AddRow(row);
-  }
-  std::string head =
+    return cells;
+  };
+  const std::string title =
       is_wrong
           ? "Wrong images"
           : "Weakly held images: what holds them lets their centres move more "
             "than ten times as far\nas the median image's (standard deviation, "
             "scene units)";
-  if (images.size() > max_rows) {
-    head += "; " + std::to_string(max_rows) + " of " + Thousands(images.size());
-  }
-  return "\n" + head + "\n" + table.ToString();
+  return "\n" + title +
+         TextIf(images.size() > max_rows, "; " + std::to_string(max_rows) +
+                                              " of " +
+                                              Thousands(images.size())) +
+         "\n" + TableOf(head, images, row, max_rows);
 }
 
 std::string ObservationTable(const ModelCheck& check, size_t max_rows) {
-  if (check.observations.empty() || max_rows == 0) return "";
-  TextTable table;
-  table.AddRow({"image", "2D point", "3D point", "w", "error, px", ""});
-  for (size_t n = 0; n < std::min(check.observations.size(), max_rows); ++n) {
-    const WrongObservation& one = check.observations[n];
-    table.AddRow(
-        {one.image_name, std::to_string(one.point2D_idx),
-         std::to_string(one.point3D_id),
-         std::isfinite(one.w) ? FormatNumber(one.w, 1) : "not in front",
-         FormatNumber(one.error_px, 2),
-         one.is_of_two ? "this or the other one" : ""});
-  }
-  return "\nWrong observations, of images that are not wrong: w, the error "
-         "over "
-         "what noise makes of it, is above " +
-         FormatNumber(check.critical_w, 2) + "\n" + table.ToString();
+  return TitledTable(
+      "Wrong observations, of images that are not wrong: w, the error over "
+      "what noise makes of it, is above " +
+          FormatNumber(check.critical_w, 2),
+      {"image", "2D point", "3D point", "w", "error, px", ""},
+      check.observations, max_rows, [](const WrongObservation& one) -> Row {
+        return {one.image_name,
+                one.point2D_idx,
+                one.point3D_id,
+                std::isfinite(one.w) ? FormatNumber(one.w, 1) : "not in front",
+                FormatNumber(one.error_px, 2),
+                one.is_of_two ? "this or the other one" : ""};
+      });
 }
 
 std::string TrackTable(const ModelCheck& check, size_t max_rows) {
-  if (check.tracks.empty() || max_rows == 0) return "";
-  TextTable table;
-  table.AddRow({"3D point", "observations that agree", "that agree on another",
-                "which is at"});
-  for (size_t n = 0; n < std::min(check.tracks.size(), max_rows); ++n) {
-    const TwoPointTrack& track = check.tracks[n];
-    table.AddRow({std::to_string(track.point3D_id),
-                  std::to_string(track.num_first),
-                  std::to_string(track.num_second),
-                  FormatNumber(track.second.x(), 3) + " " +
-                      FormatNumber(track.second.y(), 3) + " " +
-                      FormatNumber(track.second.z(), 3)});
-  }
-  return "\nTracks that are two points: " + Thousands(check.tracks.size()) +
-         "\n" + table.ToString();
+  return TitledTable(
+      "Tracks that are two points: " + Thousands(check.tracks.size()),
+      {"3D point", "observations that agree", "that agree on another",
+       "which is at"},
+      check.tracks, max_rows, [](const TwoPointTrack& track) -> Row {
+        return {track.point3D_id, track.num_first, track.num_second,
+                FormatNumber(track.second.x(), 3) + " " +
+                    FormatNumber(track.second.y(), 3) + " " +
+                    FormatNumber(track.second.z(), 3)};
+      });
 }
 
 std::string RobustAdjustment(const std::string& model, double scale_px,
@@ -150,10 +133,10 @@ std::string NextSteps(const CheckReport& report) {
            "(colmap bundle_adjuster of\n  COLMAP 4 has these options, too), "
            "and "
            "check it again:\n" +
-           RobustAdjustment(input, check.cauchy_scale_px.value_or(1),
-                            is_center_held
-                                ? " --BundleAdjustment.refine_principal_point 1"
-                                : "") +
+           RobustAdjustment(
+               input, check.cauchy_scale_px.value_or(1),
+               TextIf(is_center_held,
+                      " --BundleAdjustment.refine_principal_point 1")) +
            "    krot model_checker --input_path ADJUSTED\n";
   }
   std::string model = check.IsAnythingWrong() ? cured : input;
@@ -166,8 +149,8 @@ std::string NextSteps(const CheckReport& report) {
         " --output_path " + cured + "\n";
   }
   if (!report.moved.empty()) {
-    text += "  In it " + Counted(report.moved.size(), "wrong image") +
-            (report.moved.size() == 1 ? " has" : " have") +
+    text += "  In it " +
+            Counted(report.moved.size(), "wrong image", "has", "have") +
             " a new position, where the matches fit.\n";
   }
   if (num_wrong > static_cast<int64_t>(report.moved.size())) {
@@ -219,10 +202,9 @@ std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
   if (image.verdict == ImageVerdict::kWeaklyHeld) {
     return "its centre may move more than ten times as far as the median "
            "image's" +
-           (image.num_wrong > image.num_tested / 10
-                ? ", and " + std::to_string(image.num_wrong) +
-                      " of its observations contradict: it may be misplaced"
-                : "");
+           TextIf(image.num_wrong > image.num_tested / 10,
+                  ", and " + std::to_string(image.num_wrong) +
+                      " of its observations contradict: it may be misplaced");
   }
   switch (image.fault) {
     case ImageFault::kMatches:
@@ -230,8 +212,8 @@ std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
              PoseFaultWords(check.pairs->images[&image - check.images.data()]);
     case ImageFault::kLens:
       return "its own camera's focal length is " +
-             FormatNumber(image.focal_length_px, 0) + " px, the others' " +
-             FormatNumber(image.others_focal_length_px, 0) + " px";
+             Pixels(image.focal_length_px, 0) + ", the others' " +
+             Pixels(image.others_focal_length_px, 0);
     case ImageFault::kContradicted:
       return "most of them contradict the others";
     case ImageFault::kMisplaced:
@@ -262,35 +244,33 @@ std::string WhatIsWrong(const CheckReport& report) {
         return image.fault == ImageFault::kMatches;
       });
   const std::string noise = NoiseWords(check);
+  const std::string by_more = " by more than " + noise + " explains.";
   const std::string images =
       Thousands(num_wrong) + " of " + Counted(num_images, "image");
   const std::string observations = Thousands(num_observations) + " of " +
                                    Thousands(report.num_observations) +
                                    " observations";
+  const auto are = [](int64_t count) { return count == 1 ? " is " : " are "; };
   if (num_by_matches > 0) {
     const bool is_more = num_wrong > num_by_matches || num_observations > 0;
-    return images + (num_observations > 0 ? " and " + observations : "") +
-           (num_observations > 0 ? std::string(" are ") : Are(num_wrong)) +
+    return images + TextIf(num_observations > 0, " and " + observations) +
+           are(num_wrong + num_observations) +
            "wrong: verified matches contradict " +
            Counted(num_by_matches, "image") +
-           (is_more ? ", the rest contradicts the others by more than " +
-                          noise + " explains."
-                    : ".");
+           (is_more ? ", the rest contradicts the others" + by_more : ".");
   }
   if (num_wrong > 0 && num_observations > 0) {
     return images + " and " + observations +
-           " are wrong: they contradict the others by more than " + noise +
-           " explains.";
+           " are wrong: they contradict the others" + by_more;
   }
   if (num_wrong > 0) {
-    return images + Are(num_wrong) + "wrong: the others contradict " +
-           (num_wrong == 1 ? "it" : "them") + " by more than " + noise +
-           " explains.";
+    return images + are(num_wrong) + "wrong: the others contradict " +
+           (num_wrong == 1 ? "it" : "them") + by_more;
   }
   if (num_observations > 0) {
-    return observations + Are(num_observations) + "wrong, and no image is: " +
+    return observations + are(num_observations) + "wrong, and no image is: " +
            (num_observations == 1 ? "it contradicts" : "they contradict") +
-           " the others by more than " + noise + " explains.";
+           " the others" + by_more;
   }
   if (check.pairs && !check.pairs->groups.empty()) {
     return "The images fall into " +
@@ -305,9 +285,8 @@ std::string WhatIsWrong(const CheckReport& report) {
   return "Nothing is wrong: all " + Thousands(report.num_observations) +
          " observations of " + Counted(num_images, "image") + " agree within " +
          noise +
-         (num_weak > 0 ? "; " + Counted(num_weak, "image") + Are(num_weak) +
-                             "weakly held"
-                       : "") +
+         TextIf(num_weak > 0, "; " + Counted(num_weak, "image", "is", "are") +
+                                  " weakly held") +
          ".";
 }
 
@@ -318,8 +297,7 @@ std::string ForAdjusted(const CheckReport& report) {
   if (parts.empty()) return text;
   text.pop_back();  // the full stop
   return text + (report.check.IsAnythingWrong() ? "; and " : "; but ") +
-         Counted(parts.size(), "part") + (parts.size() > 1 ? " are" : " is") +
-         " loose.";
+         Counted(parts.size(), "part", "is", "are") + " loose.";
 }
 
 }  // namespace
@@ -363,8 +341,7 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
          ImageTable(check, ImageVerdict::kWeaklyHeld, num_rows) +
          PartTable(check, num_rows) + ObservationTable(check, num_rows) +
          TrackTable(check, num_rows) + NextSteps(report) + "\n" +
-         RunSentence(report.run,
-                     "checked " + FormatNumber(report.seconds_check, 2) + " s");
+         RunSentence(report.run, "checked " + Seconds(report.seconds_check));
 }
 
 }  // namespace krot::internal

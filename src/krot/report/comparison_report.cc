@@ -1,9 +1,6 @@
-#include <algorithm>
 #include <cmath>
-#include <functional>
 #include <iomanip>
 #include <sstream>
-#include <vector>
 
 #include "krot/base/numbers.h"
 #include "krot/report/report_json.h"
@@ -21,14 +18,13 @@ std::string FormatShare(double length, double scene_radius) {
 }
 
 std::string CountTable(const ComparisonSummary& summary) {
-  TextTable table;
-  table.AddRow({"", "model 1", "model 2", "in both", "only in 1", "only in 2"});
+  TextTable table(
+      {"", "model 1", "model 2", "in both", "only in 1", "only in 2"});
   const auto add = [&](const std::string& name, int64_t ModelCounts::*count) {
     const int64_t shared = summary.shared.*count;
-    table.AddRow({name, std::to_string(summary.model1.*count),
-                  std::to_string(summary.model2.*count), std::to_string(shared),
-                  std::to_string(summary.model1.*count - shared),
-                  std::to_string(summary.model2.*count - shared)});
+    table.AddRow({name, summary.model1.*count, summary.model2.*count, shared,
+                  summary.model1.*count - shared,
+                  summary.model2.*count - shared});
   };
   add("images", &ModelCounts::num_images);
   add("points", &ModelCounts::num_points);
@@ -59,31 +55,32 @@ std::string AlignmentSentence(const ComparisonSummary& summary) {
          FormatLength(summary.moved) + ")";
 }
 
-void AddDifferences(const std::string& name,
-                    const DifferenceStatistics& differences,
-                    const std::function<std::string(double)>& format,
-                    TextTable* table) {
-  if (differences.count == 0) {
-    table->AddRow({name, "0", "-", "-", "-", "-"});
-    return;
-  }
-  table->AddRow({name, std::to_string(differences.count),
-                 format(differences.max), format(differences.median),
-                 format(differences.mean), format(differences.rms)});
+template <typename Format>
+Row DifferenceRow(const std::string& name,
+                  const DifferenceStatistics& differences,
+                  const Format& format) {
+  if (differences.count == 0) return {name, "0", "-", "-", "-", "-"};
+  return {name,
+          differences.count,
+          format(differences.max),
+          format(differences.median),
+          format(differences.mean),
+          format(differences.rms)};
 }
 
 std::string DifferenceTable(const ComparisonSummary& summary) {
   const auto share = [&summary](double length) {
     return FormatShare(length, summary.scene_radius);
   };
-  TextTable table;
-  table.AddRow({"", "count", "max", "median", "mean", "RMS"});
-  AddDifferences("rotations, degrees", summary.rotation_deg, FormatAngle,
-                 &table);
-  AddDifferences("centres, scene units", summary.center, FormatLength, &table);
-  AddDifferences("centres, % of the radius", summary.center, share, &table);
-  AddDifferences("points, scene units", summary.point, FormatLength, &table);
-  AddDifferences("points, % of the radius", summary.point, share, &table);
+  TextTable table({"", "count", "max", "median", "mean", "RMS"});
+  const auto add = [&](const char* name, const auto& of, const auto& format) {
+    table.AddRow(DifferenceRow(name, of, format));
+  };
+  add("rotations, degrees", summary.rotation_deg, FormatAngle);
+  add("centres, scene units", summary.center, FormatLength);
+  add("centres, % of the radius", summary.center, share);
+  add("points, scene units", summary.point, FormatLength);
+  add("points, % of the radius", summary.point, share);
   return "\nHow far cameras and points are apart, " +
          AlignmentSentence(summary) + "\n" + table.ToString() +
          "The cameras' radius, RMS about their centroid, is " +
@@ -91,12 +88,11 @@ std::string DifferenceTable(const ComparisonSummary& summary) {
 }
 
 std::string ComparedErrorTable(const ComparisonSummary& summary) {
-  TextTable table;
-  AddErrorHead("", &table);
-  AddErrorRow("model 1", summary.errors1, &table);
-  AddErrorRow("model 2", summary.errors2, &table);
-  AddErrorRow("model 1, those in both", summary.shared_errors1, &table);
-  AddErrorRow("model 2, those in both", summary.shared_errors2, &table);
+  TextTable table(ErrorHead(""));
+  table.AddRow(ErrorRow("model 1", summary.errors1));
+  table.AddRow(ErrorRow("model 2", summary.errors2));
+  table.AddRow(ErrorRow("model 1, those in both", summary.shared_errors1));
+  table.AddRow(ErrorRow("model 2, those in both", summary.shared_errors2));
   std::string text = "\nTrue reprojection errors, pixels\n" + table.ToString();
   const int64_t not_finite1 = summary.errors1.not_finite;
   const int64_t not_finite2 = summary.errors2.not_finite;
@@ -113,28 +109,28 @@ std::string FormatMax(const PixelErrorStatistics& errors) {
 
 // The images with the largest key, descending; those whose key is not positive
 // are not listed.
-std::string ImageTable(
-    const std::string& head, const ComparisonSummary& summary, size_t max_rows,
-    const std::function<double(const ImageDifference&)>& key) {
-  std::vector<const ImageDifference*> images;
-  for (const ImageDifference& image : summary.images) {
-    if (key(image) > 0) images.push_back(&image);
-  }
+template <typename Key>
+std::string ImageTable(const std::string& title,
+                       const ComparisonSummary& summary, size_t max_rows,
+                       const Key& key) {
+  auto images = PointersIf(summary.images, [&](const ImageDifference& image) {
+    return key(image) > 0;
+  });
   SortLargestFirst(&images, [&](const auto* image) { return key(*image); });
-  images.resize(std::min(images.size(), max_rows));
-  if (images.empty()) return "";
-  TextTable table;
-  table.AddRow({"image", "degrees", "centre", "% of the radius", "max 1, px",
-                "max 2, px"});
-  for (const ImageDifference* image : images) {
-    const PoseDifference pose =
-        image->pose.value_or(PoseDifference{kNaN, kNaN});
-    table.AddRow({image->image_name, FormatAngle(pose.rotation_deg),
-                  FormatLength(pose.center),
-                  FormatShare(pose.center, summary.scene_radius),
-                  FormatMax(image->errors1), FormatMax(image->errors2)});
-  }
-  return "\n" + head + "\n" + table.ToString();
+  return TitledTable(title,
+                     {"image", "degrees", "centre", "% of the radius",
+                      "max 1, px", "max 2, px"},
+                     images, max_rows,
+                     [&](const ImageDifference* image) -> Row {
+                       const PoseDifference pose =
+                           image->pose.value_or(PoseDifference{kNaN, kNaN});
+                       return {image->image_name,
+                               FormatAngle(pose.rotation_deg),
+                               FormatLength(pose.center),
+                               FormatShare(pose.center, summary.scene_radius),
+                               FormatMax(image->errors1),
+                               FormatMax(image->errors2)};
+                     });
 }
 
 double DistanceMoved(const ImageDifference& image) {
@@ -147,19 +143,17 @@ double MaxErrorChange(const ImageDifference& image) {
 }
 
 std::string WorstPointTable(const ComparisonSummary& summary, size_t max_rows) {
-  TextTable table;
-  table.AddRow({"point3D_id 1", "point3D_id 2", "distance", "% of the radius"});
-  size_t num_rows = 0;
-  for (const PointDifference& point : summary.worst_points) {
-    if (num_rows == max_rows || !(point.distance > 0)) break;
-    ++num_rows;
-    table.AddRow({std::to_string(point.point3D_id1),
-                  std::to_string(point.point3D_id2),
-                  FormatLength(point.distance),
-                  FormatShare(point.distance, summary.scene_radius)});
-  }
-  if (num_rows == 0) return "";
-  return "\nThe points farthest apart\n" + table.ToString();
+  return TitledTable(
+      "The points farthest apart",
+      {"point3D_id 1", "point3D_id 2", "distance", "% of the radius"},
+      PointersIf(
+          summary.worst_points,
+          [](const PointDifference& point) { return point.distance > 0; }),
+      max_rows, [&](const PointDifference* point) -> Row {
+        return {point->point3D_id1, point->point3D_id2,
+                FormatLength(point->distance),
+                FormatShare(point->distance, summary.scene_radius)};
+      });
 }
 
 std::string CertificateText(const std::string& name,
@@ -216,36 +210,22 @@ Json AlignmentJson(const ComparisonSummary& summary) {
 }
 
 Json DifferenceJson(const DifferenceStatistics& differences) {
-  const auto known = [&differences](double value) {
-    return differences.count > 0 ? Json(value) : Json();
-  };
-  return {{"count", differences.count},
-          {"max", known(differences.max)},
-          {"median", known(differences.median)},
-          {"mean", known(differences.mean)},
-          {"rms", known(differences.rms)}};
+  return Joined({{"count", differences.count}},
+                KnownIf(differences.count > 0,
+                        KROT_JSON_OF(differences, max, median, mean, rms)));
 }
 
-Json SharedImagesJson(const std::vector<ImageDifference>& images) {
-  return ListJson(images, [&](const ImageDifference& image) -> Json {
-    return {
-        {"image_name", image.image_name},
-        {"image_id1", image.image_id1},
-        {"image_id2", image.image_id2},
-        {"rotation_deg", image.pose ? Json(image.pose->rotation_deg) : Json()},
-        {"center", image.pose ? Json(image.pose->center) : Json()},
-        {"pixel_error",
-         {{"model1", CountedErrorJson(image.errors1)},
-          {"model2", CountedErrorJson(image.errors2)}}}};
-  });
+Json SharedImageJson(const ImageDifference& image) {
+  Json json = KROT_JSON_OF(image, image_name, image_id1, image_id2);
+  json.update(KROT_JSON_OF(image.pose.value_or(PoseDifference{kNaN, kNaN}),
+                           rotation_deg, center));
+  json["pixel_error"] = {{"model1", CountedErrorJson(image.errors1)},
+                         {"model2", CountedErrorJson(image.errors2)}};
+  return json;
 }
 
-Json WorstPointsJson(const std::vector<PointDifference>& points) {
-  return ListJson(points, [&](const PointDifference& point) -> Json {
-    return {{"point3D_id1", point.point3D_id1},
-            {"point3D_id2", point.point3D_id2},
-            {"distance", point.distance}};
-  });
+Json WorstPointJson(const PointDifference& point) {
+  return KROT_JSON_OF(point, point3D_id1, point3D_id2, distance);
 }
 
 }  // namespace
@@ -273,12 +253,12 @@ std::string ComparisonJson(const ComparisonReport& report) {
         {"model2", CountedErrorJson(summary.errors2)},
         {"shared1", CountedErrorJson(summary.shared_errors1)},
         {"shared2", CountedErrorJson(summary.shared_errors2)}}},
-      {"images", SharedImagesJson(summary.images)},
-      {"worst_points", WorstPointsJson(summary.worst_points)},
+      {"images", ListJson(summary.images, SharedImageJson)},
+      {"worst_points", ListJson(summary.worst_points, WorstPointJson)},
       {"distances", DistancesJson(report.distances, {"model1", "model2"})},
       {"certificate",
-       {{"model1", VerdictJson(report.certificate1)},
-        {"model2", VerdictJson(report.certificate2)}}},
+       {{"model1", JsonIf(report.certificate1, VerdictJson)},
+        {"model2", JsonIf(report.certificate2, VerdictJson)}}},
   };
   return ReportText(json);
 }

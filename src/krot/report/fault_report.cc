@@ -1,8 +1,9 @@
 #include "krot/report/reports.h"
 
-#include <algorithm>
 #include <cmath>
+#include <functional>
 
+#include "krot/base/numbers.h"
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
@@ -36,8 +37,8 @@ const char* CameraFaultName(CameraFault fault) {
 std::string CameraFaultWords(const WrongCamera& camera) {
   const bool is_one = camera.num_images == 1;
   const std::string ask =
-      (is_one ? std::string("its image asks")
-              : "its " + Counted(camera.num_images, "image") + " ask") +
+      "its " +
+      (is_one ? "image asks" : Counted(camera.num_images, "image") + " ask") +
       " for ";
   switch (camera.fault) {
     case CameraFault::kFocalLength:
@@ -60,10 +61,8 @@ std::string CameraFaultWords(const WrongCamera& camera) {
 }  // namespace
 
 std::string PartsSentence(const ModelCheck& check) {
-  std::vector<const ModelPart*> apart, weak;
-  for (const ModelPart& part : check.parts) {
-    (IsApart(part) ? apart : weak).push_back(&part);
-  }
+  const auto apart = PointersIf(check.parts, IsApart);
+  auto weak = PointersIf(check.parts, std::not_fn(IsApart));
   const auto words = [&](const ModelPart& part) {
     return Counted(part.images.size(), "image") + " (" +
            NameOfFirst(check, part) + ")";
@@ -79,52 +78,44 @@ std::string PartsSentence(const ModelCheck& check) {
            " relative to the rest, nor in which scale.";
   }
   if (weak.empty()) return text;
-  const ModelPart& weakest = **std::max_element(
-      weak.begin(), weak.end(), [](const ModelPart* a, const ModelPart* b) {
-        return a->relative_center_sigma < b->relative_center_sigma;
-      });
+  SortLargestFirst(&weak, &ModelPart::relative_center_sigma);
+  const ModelPart& weakest = *weak.front();
   const bool is_held = std::isfinite(weakest.relative_center_sigma);
   return text + (text.empty() ? "" : " ") +
-         Counted(weakest.num_tracks, "track") +
-         (weakest.num_tracks == 1 ? " ties " : " tie ") + words(weakest) +
-         " to the rest " +
+         Counted(weakest.num_tracks, "track", "ties ", "tie ") +
+         words(weakest) + " to the rest " +
          (is_held ? "so weakly that noise alone may have moved them, all "
                     "together, by " +
                         FormatNumber(100 * weakest.relative_center_sigma, 0) +
                         " % of the cameras' radius (standard deviation)"
                   : "and leave their common place, turn or scale open") +
-         (weak.size() > 1 ? "; " + Counted(weak.size() - 1, "other part") +
-                                (weak.size() > 2 ? " are" : " is") + " as loose"
-                          : "") +
+         TextIf(weak.size() > 1,
+                "; " + Counted(weak.size() - 1, "other part", "is", "are") +
+                    " as loose") +
          ".";
 }
 
 std::string PartTable(const ModelCheck& check, size_t max_rows) {
-  if (check.parts.empty() || max_rows == 0) return "";
-  TextTable table;
-  table.AddRow({"images of the part", "tracks it shares", "cameras +-",
-                "% of the radius"});
-  for (size_t n = 0; n < std::min(check.parts.size(), max_rows); ++n) {
-    const ModelPart& part = check.parts[n];
-    table.AddRow(
-        {Thousands(part.images.size()) + " (" + NameOfFirst(check, part) + ")",
-         std::to_string(part.num_tracks), SigmaText(part.center_sigma),
-         std::isfinite(part.relative_center_sigma)
-             ? FormatNumber(100 * part.relative_center_sigma, 1)
-             : "-"});
-  }
-  return "\nParts that tracks do not tie to the rest firmly: " +
-         Thousands(check.parts.size()) + "\n" + table.ToString();
+  return TitledTable("Parts that tracks do not tie to the rest firmly: " +
+                         Thousands(check.parts.size()),
+                     {"images of the part", "tracks it shares", "cameras +-",
+                      "% of the radius"},
+                     check.parts, max_rows, [&](const ModelPart& part) -> Row {
+                       return {
+                           Thousands(part.images.size()) + " (" +
+                               NameOfFirst(check, part) + ")",
+                           part.num_tracks, SigmaText(part.center_sigma),
+                           FormatNumber(100 * part.relative_center_sigma, 1)};
+                     });
 }
 
 nlohmann::ordered_json PartsJson(const ModelCheck& check) {
-  return ListJson(check.parts, [&](const ModelPart& part) -> Json {
-    Json names = Json::array();
-    for (const int32_t n : part.images) names.push_back(check.images[n].name);
-    return {{"num_tracks", part.num_tracks},
-            {"center_sigma", FiniteOrNull(part.center_sigma)},
-            {"relative_center_sigma", FiniteOrNull(part.relative_center_sigma)},
-            {"images", names}};
+  return ListJson(check.parts, [&](const ModelPart& part) {
+    Json json =
+        KROT_JSON_OF(part, num_tracks, center_sigma, relative_center_sigma);
+    json["images"] =
+        ListJson(part.images, [&](int32_t n) { return check.images[n].name; });
+    return json;
   });
 }
 
@@ -140,44 +131,40 @@ std::string CamerasSentence(const ModelCheck& check) {
 }
 
 std::string CameraTable(const ModelCheck& check, size_t max_rows) {
-  if (check.cameras.empty() || max_rows == 0) return "";
-  TextTable table;
-  table.AddRow({"camera", "images", "squared errors that go, %", "why"});
-  for (size_t n = 0; n < std::min(check.cameras.size(), max_rows); ++n) {
-    const WrongCamera& camera = check.cameras[n];
-    table.AddRow(
-        {std::to_string(camera.camera_id), std::to_string(camera.num_images),
-         FormatNumber(100 * camera.gain, 0), CameraFaultWords(camera)});
-  }
-  return "\nWrong cameras\n" + table.ToString();
+  return TitledTable(
+      "Wrong cameras", {"camera", "images", "squared errors that go, %", "why"},
+      check.cameras, max_rows, [](const WrongCamera& camera) -> Row {
+        return {camera.camera_id, camera.num_images,
+                FormatNumber(100 * camera.gain, 0), CameraFaultWords(camera)};
+      });
 }
 
 nlohmann::ordered_json CamerasJson(const ModelCheck& check) {
-  return ListJson(check.cameras, [&](const WrongCamera& camera) -> Json {
-    const auto only = [&](CameraFault fault, double value) {
-      return camera.fault == fault ? Json(value) : Json();
+  return ListJson(check.cameras, [](const WrongCamera& camera) {
+    const auto only = [&](CameraFault fault, const Json& values) {
+      return KnownIf(camera.fault == fault, values);
     };
-    return {{"camera_id", camera.camera_id},
-            {"fault", CameraFaultName(camera.fault)},
-            {"reason", CameraFaultWords(camera)},
-            {"num_images", camera.num_images},
-            {"gain", camera.gain},
-            {"focal_length_px",
-             only(CameraFault::kFocalLength, camera.focal_length_px)},
-            {"asked_focal_length_px",
-             only(CameraFault::kFocalLength, camera.asked_focal_length_px)},
-            {"offset_px", only(CameraFault::kPrincipalPoint, camera.offset_px)},
-            {"turn_deg", only(CameraFault::kPlaceInRig, camera.turn_deg)},
-            {"shift", only(CameraFault::kPlaceInRig, camera.shift)}};
+    Json json = {{"camera_id", camera.camera_id},
+                 {"fault", CameraFaultName(camera.fault)},
+                 {"reason", CameraFaultWords(camera)},
+                 {"num_images", camera.num_images},
+                 {"gain", camera.gain}};
+    json.update(
+        only(CameraFault::kFocalLength,
+             KROT_JSON_OF(camera, focal_length_px, asked_focal_length_px)));
+    json.update(
+        only(CameraFault::kPrincipalPoint, KROT_JSON_OF(camera, offset_px)));
+    json.update(
+        only(CameraFault::kPlaceInRig, KROT_JSON_OF(camera, turn_deg, shift)));
+    return json;
   });
 }
 
 std::string LastingFaultLines(const LastingFaults& faults) {
   std::string text;
   if (faults.num_in_camera > 0) {
-    text += Counted(faults.num_in_camera, "observation") +
-            (faults.num_in_camera == 1 ? " sees a point that lies"
-                                       : " see points that lie") +
+    text += Counted(faults.num_in_camera, "observation",
+                    "sees a point that lies", "see points that lie") +
             " in the camera itself, which no adjustment mends: krot "
             "model_checker --output_path, or krot outlier_filter, removes " +
             (faults.num_in_camera == 1 ? "it" : "them") + ".\n";
@@ -192,6 +179,85 @@ std::string LastingFaultLines(const LastingFaults& faults) {
         "them.\n";
   }
   return text;
+}
+
+namespace {
+
+const char* VerdictName(ImageVerdict verdict) {
+  constexpr const char* kNames[] = {"fine", "weakly held", "wrong"};
+  return kNames[static_cast<size_t>(verdict)];
+}
+
+// The name in report.json of the reason why an image is wrong.
+const char* FaultName(ImageFault fault) {
+  using Enum = ImageFault;
+  return NameIn<Enum>({{Enum::kNone, "none"},
+                       {Enum::kMatches, "matches"},
+                       {Enum::kLens, "lens"},
+                       {Enum::kContradicted, "contradicted"},
+                       {Enum::kMisplaced, "misplaced"},
+                       {Enum::kChance, "chance"},
+                       {Enum::kUnsupported, "unsupported"}},
+                      fault);
+}
+
+Json ImageJson(const ModelCheck& check, const ImageCheck& image) {
+  Json json = {{"image_id", image.image_id},
+               {"image_name", image.name},
+               {"verdict", VerdictName(image.verdict)},
+               {"fault", image.fault == ImageFault::kNone
+                             ? Json()
+                             : Json(FaultName(image.fault))},
+               {"reason", ReasonOf(check, image)}};
+  json.update(KROT_JSON_OF(image, num_observations, num_tested, num_wrong,
+                           center_sigma, relative_center_sigma, turn_sigma_deg,
+                           turn_deg, shift));
+  return json;
+}
+
+Json TwoPointsJson(const TwoPointTrack& track) {
+  return Joined(KROT_JSON_OF(track, point3D_id, num_first, num_second),
+                {{"second", VectorJson(track.second)}});
+}
+
+}  // namespace
+
+std::string CheckJson(const CheckReport& report) {
+  const ModelCheck& check = report.check;
+  const auto of_image = [&](const ImageCheck& image) {
+    return ImageJson(check, image);
+  };
+  const auto of_observation = [](const WrongObservation& one) {
+    return ObservationJson(one, KROT_JSON_OF(one, w, error_px, is_of_two));
+  };
+  const Json json = {
+      {"version", report.run.version},
+      {"command", "model_checker"},
+      {"verdict", CheckSentence(report)},
+      {"is_anything_wrong", check.IsAnythingWrong()},
+      {"is_adjusted", check.is_adjusted},
+      {"num_images", check.images.size()},
+      {"num_wrong_images", check.NumImages(ImageVerdict::kWrong)},
+      {"num_weakly_held_images", check.NumImages(ImageVerdict::kWeaklyHeld)},
+      {"num_observations", report.num_observations},
+      {"num_tested", check.num_tested},
+      {"num_wrong_observations", check.observations.size()},
+      {"sigma_px", check.sigma_px},
+      {"cauchy_scale_px", check.cauchy_scale_px},
+      {"median_scale_px", check.median_scale_px},
+      {"critical_w", check.critical_w},
+      {"pixel_error",
+       BeforeAfterJson(report.pixel_error_before, report.pixel_error_after)},
+      {"database", JsonIf(check.pairs, PairJson)},
+      {"moved_images", report.moved},
+      {"cameras", CamerasJson(check)},
+      {"images", ListJson(check.images, of_image)},
+      {"observations", ListJson(check.observations, of_observation)},
+      {"tracks", ListJson(check.tracks, TwoPointsJson)},
+      {"parts_sentence", PartsSentence(check)},
+      {"parts", PartsJson(check)},
+  };
+  return ReportText(json, report.run, {{"check", report.seconds_check}});
 }
 
 }  // namespace krot::internal

@@ -163,12 +163,6 @@ Eigen::Vector2d HalfExtent(const Camera& camera) {
           bounded(static_cast<double>(camera.height) / (2 * J(1, 1)))};
 }
 
-Json ErrorsJson(const PixelErrorStatistics& errors) {
-  Json json = {{"count", errors.count}};
-  json.update(ErrorJson(errors));
-  return json;
-}
-
 Json ImageJson(const ImageErrors& image, const Camera& camera,
                const ImageGeometry& geometry) {
   Json center;
@@ -190,7 +184,8 @@ Json ImageJson(const ImageErrors& image, const Camera& camera,
           {"center", center},
           {"world_from_cam", world_from_cam},
           {"half_extent", {half_extent.x(), half_extent.y()}},
-          {"pixel_error", ErrorsJson(image.errors)}};
+          {"pixel_error",
+           Joined({{"count", image.errors.count}}, ErrorJson(image.errors))}};
 }
 
 Json ViewedImagesJson(const Model& model,

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <nlohmann/json_fwd.hpp>
 
+#include "krot/database.h"
 #include "krot/model.h"
 
 namespace krot::internal {
@@ -69,6 +71,16 @@ inline constexpr int64_t kMaxShownPoints = 100'000;
 std::string ModelViewJson(const Model& model, const Eigen::Vector3d& origin,
                           int64_t max_points = kMaxShownPoints,
                           int num_threads = -1);
+
+// What the page draws of the matches. `images` are in the order of the report:
+// their width and height on the page, and jpeg, which is null until a photo is
+// added. `matches` lists up to 100 matches of each pair (of kept pairs 30),
+// evenly chosen from all: x and y in both images, and 1 if the match agrees
+// with the poses, otherwise 0. `check` must be CheckPairs' of the model and the
+// database. O(matches).
+nlohmann::ordered_json PairViewJson(const Model& model,
+                                    const Database& database,
+                                    const PairCheck& check);
 
 // Indices, ascending, of at most `max_count` of the points: of all, if they are
 // no more; otherwise of the max_count / 100 points with the largest errors (NaN

@@ -48,23 +48,18 @@ Json PositionFrameJson(const std::optional<PositionFrame>& position_frame,
                        bool is_written) {
   if (!position_frame) return nullptr;
   const PositionFrame& frame = *position_frame;
-  Json wrong =
-      ListJson(frame.wrong, [&](const WrongPosition& position) -> Json {
-        return {{"name", position.name},
-                {"distance", position.distance},
-                {"radius", position.radius}};
-      });
   const Similarity& own_from_model = frame.own_from_model;
-  return {
+  Json json = {
       {"scale", own_from_model.scale},
       {"quaternion_wxyz", ToWxyz(Eigen::Quaterniond(own_from_model.rotation))},
       {"translation", VectorJson(own_from_model.translation)},
-      {"is_written", is_written},
-      {"num_compared", frame.num_compared},
-      {"median_distance", frame.median_distance},
-      {"tolerance", frame.tolerance},
-      {"radius", NumberOrNull(frame.radius)},
-      {"wrong", std::move(wrong)}};
+      {"is_written", is_written}};
+  json.update(
+      KROT_JSON_OF(frame, num_compared, median_distance, tolerance, radius));
+  json["wrong"] = ListJson(frame.wrong, [](const WrongPosition& position) {
+    return KROT_JSON_OF(position, name, distance, radius);
+  });
+  return json;
 }
 
 namespace {
@@ -83,13 +78,12 @@ bool IsContradicted(const DistanceReport& report, size_t n) {
 std::string ScaleWords(const MeasuredDistances& measured) {
   const DistanceScale& scale = *measured.scale;
   return "a unit of the model is " + Metres(scale.scale) +
-         (scale.lowest < scale.highest
-              ? " (" + FormatLength(scale.lowest) + " to " +
-                    FormatLength(scale.highest) + ")"
-              : std::string()) +
+         TextIf(scale.lowest < scale.highest,
+                " (" + FormatLength(scale.lowest) + " to " +
+                    FormatLength(scale.highest) + ")") +
          " by " + Counted(scale.num_agreeing, "distance") +
-         (scale.is_unique ? ""
-                          : ", though others that contradict them are as many");
+         TextIf(!scale.is_unique,
+                ", though others that contradict them are as many");
 }
 
 }  // namespace
@@ -111,16 +105,14 @@ std::vector<std::string> ContradictedDistances(const DistanceReport& report) {
 std::string DistanceTable(const DistanceReport& report,
                           const std::vector<std::string>& heads) {
   const bool has_scale = report.models.back().scale.has_value();
-  TextTable table;
-  std::vector<std::string> head = {"", "known", "within"};
+  Row head = {"", "known", "within"};
   head.insert(head.end(), heads.begin(), heads.end());
   head.push_back("off");
-  table.AddRow(std::move(head));
+  TextTable table(std::move(head));
   for (size_t n = 0; n < report.distances.size(); ++n) {
     const KnownDistance& distance = report.distances[n];
-    std::vector<std::string> row = {
-        report.names[n], distance.metres ? FormatLength(*distance.metres) : "-",
-        distance.metres ? FormatLength(distance.tolerance) : "-"};
+    Row row = {report.names[n], FormatLength(distance.metres),
+               distance.metres ? FormatLength(distance.tolerance) : "-"};
     for (const MeasuredDistances& measured : report.models) {
       row.push_back(FormatNumber(LengthIn(measured, n), 4));
     }
@@ -149,23 +141,22 @@ Json DistancesJson(const std::optional<DistanceReport>& report,
     const KnownDistance& distance = report->distances[n];
     Json entry = {
         {"name", report->names[n]},
-        {"metres", NumberOrNull(distance.metres)},
+        {"metres", distance.metres},
         {"tolerance", distance.metres ? Json(distance.tolerance) : Json()},
         {"is_contradicted", IsContradicted(*report, n)}};
     for (size_t model = 0; model < names.size(); ++model) {
-      entry[names[model]] = FiniteOrNull(report->models[model].lengths[n]);
+      entry[names[model]] = report->models[model].lengths[n];
     }
     list.push_back(std::move(entry));
   }
   Json scales = Json::object();
   for (size_t model = 0; model < names.size(); ++model) {
-    const std::optional<DistanceScale>& scale = report->models[model].scale;
-    scales[names[model]] = scale ? Json({{"metres_per_unit", scale->scale},
-                                         {"lowest", scale->lowest},
-                                         {"highest", scale->highest},
-                                         {"num_agreeing", scale->num_agreeing},
-                                         {"is_unique", scale->is_unique}})
-                                 : Json();
+    scales[names[model]] =
+        JsonIf(report->models[model].scale, [](const DistanceScale& scale) {
+          return Joined(
+              {{"metres_per_unit", scale.scale}},
+              KROT_JSON_OF(scale, lowest, highest, num_agreeing, is_unique));
+        });
   }
   return {{"is_scale_taken", report->is_scale_taken},
           {"scales", std::move(scales)},
@@ -173,27 +164,19 @@ Json DistancesJson(const std::optional<DistanceReport>& report,
 }
 
 std::string AdjustedDistanceTable(const DistanceComparison& comparison) {
-  const auto number = [](double value, int digits) {
-    return std::isfinite(value) ? FormatNumber(value, digits) : "-";
-  };
-  TextTable table;
-  table.AddRow({"", "known", "within", "adjusted", "sigma", "off", "r", "w"});
+  TextTable table(
+      {"", "known", "within", "adjusted", "sigma", "off", "r", "w"});
   int64_t num_taking_part = 0;
   std::string wrong;
   for (const DistanceComparison::Distance& distance : comparison.distances) {
     num_taking_part += distance.takes_part ? 1 : 0;
-    std::vector<std::string> row = {distance.name, "-", "-"};
-    if (distance.metres) {
-      row[1] = FormatNumber(*distance.metres, 6);
-      row[2] = FormatNumber(distance.tolerance, 6);
-    }
-    row.push_back(number(distance.length, 6));
-    row.push_back(number(distance.sigma, 6));
-    row.push_back(number(distance.Off(), 6) +
-                  (distance.IsContradicted() ? " !" : ""));
-    row.push_back(number(distance.redundancy, 3));
-    row.push_back(number(distance.w, 2));
-    table.AddRow(std::move(row));
+    table.AddRow(
+        {distance.name, FormatNumber(distance.metres, 6),
+         distance.metres ? FormatNumber(distance.tolerance, 6) : "-",
+         FormatNumber(distance.length, 6), FormatNumber(distance.sigma, 6),
+         FormatNumber(distance.Off(), 6) +
+             TextIf(distance.IsContradicted(), " !"),
+         FormatNumber(distance.redundancy, 3), FormatNumber(distance.w, 2)});
     if (!distance.IsContradicted()) continue;
     wrong +=
         "! The distance of " + distance.name + " is " +
@@ -218,21 +201,18 @@ std::string AdjustedDistanceTable(const DistanceComparison& comparison) {
 Json AdjustedDistancesJson(
     const std::optional<DistanceComparison>& comparison) {
   if (!comparison) return nullptr;
-  Json list =
-      ListJson(comparison->distances, [&](const auto& distance) -> Json {
-        return {
-            {"name", distance.name},
-            {"metres", NumberOrNull(distance.metres)},
-            {"tolerance", distance.metres ? Json(distance.tolerance) : Json()},
-            {"takes_part", distance.takes_part},
-            {"is_contradicted", distance.IsContradicted()},
-            {"after", FiniteOrNull(distance.length)},
-            {"sigma", FiniteOrNull(distance.sigma)},
-            {"redundancy", FiniteOrNull(distance.redundancy)},
-            {"w", FiniteOrNull(distance.w)}};
-      });
-  return {{"metres_per_unit", NumberOrNull(comparison->metres_per_unit)},
-          {"distances", std::move(list)}};
+  return {{"metres_per_unit", comparison->metres_per_unit},
+          {"distances", ListJson(comparison->distances, [](const auto& of) {
+             Json json = {
+                 {"name", of.name},
+                 {"metres", of.metres},
+                 {"tolerance", of.metres ? Json(of.tolerance) : Json()},
+                 {"takes_part", of.takes_part},
+                 {"is_contradicted", of.IsContradicted()},
+                 {"after", of.length}};
+             json.update(KROT_JSON_OF(of, sigma, redundancy, w));
+             return json;
+           })}};
 }
 
 }  // namespace krot::internal

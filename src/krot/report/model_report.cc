@@ -94,9 +94,8 @@ std::string ColmapFigures(const ColmapStatistics& colmap) {
 }
 
 std::string OverallErrors(const ModelReport& report) {
-  TextTable table;
-  AddErrorHead("", &table);
-  AddErrorRow("all", report.pixel_error, &table);
+  TextTable table(ErrorHead(""));
+  table.AddRow(ErrorRow("all", report.pixel_error));
   std::string text = "\nTrue reprojection errors, pixels\n" + table.ToString();
   if (report.pixel_error.not_finite > 0) {
     text += std::to_string(report.pixel_error.not_finite) +
@@ -105,58 +104,48 @@ std::string OverallErrors(const ModelReport& report) {
   return text;
 }
 
-// Keeps the `max_rows` with the largest errors, and returns the head of their
-// table: "By image, pixels; the 10 of 96 with the largest errors".
-template <typename Errors>
-std::string KeepWorst(const std::string& name, size_t max_rows,
-                      std::vector<Errors>* all) {
-  const size_t total = all->size();
-  SortLargestFirst(all, [](const Errors& one) { return one.errors.max; });
-  all->resize(std::min(total, max_rows));
+// The `max_rows` with the largest errors: "By image, pixels; the 10 of 96 with
+// the largest errors".
+template <typename Errors, typename NameOf>
+std::string WorstErrorTable(const std::string& name, std::vector<Errors> all,
+                            size_t max_rows, const NameOf& name_of) {
+  SortLargestFirst(&all, [](const Errors& one) { return one.errors.max; });
   return "\nBy " + name + ", pixels" +
-         (all->size() < total
-              ? "; the " + std::to_string(all->size()) + " of " +
-                    std::to_string(total) + " with the largest errors"
-              : std::string()) +
-         "\n";
+         TextIf(all.size() > max_rows, "; the " + std::to_string(max_rows) +
+                                           " of " + std::to_string(all.size()) +
+                                           " with the largest errors") +
+         "\n" +
+         TableOf(
+             ErrorHead(name), all,
+             [&](const Errors& one) {
+               return ErrorRow(name_of(one), one.errors);
+             },
+             max_rows);
 }
 
-std::string CameraErrorTable(std::vector<CameraErrors> cameras,
-                             size_t max_cameras) {
-  const std::string head = KeepWorst("camera", max_cameras, &cameras);
-  TextTable table;
-  AddErrorHead("camera", &table);
-  for (const CameraErrors& camera : cameras) {
-    AddErrorRow(std::to_string(camera.camera_id) + ", " +
-                    Counted(camera.num_images, "image"),
-                camera.errors, &table);
-  }
-  return head + table.ToString();
+std::string CameraErrorTable(const ModelReport& report, size_t max_rows) {
+  return WorstErrorTable("camera", report.cameras, max_rows,
+                         [](const CameraErrors& camera) {
+                           return std::to_string(camera.camera_id) + ", " +
+                                  Counted(camera.num_images, "image");
+                         });
 }
 
-std::string ImageErrorTable(std::vector<ImageErrors> images,
-                            size_t max_images) {
-  const std::string head = KeepWorst("image", max_images, &images);
-  TextTable table;
-  AddErrorHead("image", &table);
-  for (const ImageErrors& image : images) {
-    AddErrorRow(std::to_string(image.image_id) + " " + image.image_name,
-                image.errors, &table);
-  }
-  return head + table.ToString();
+std::string ImageErrorTable(const ModelReport& report, size_t max_rows) {
+  return WorstErrorTable(
+      "image", report.images, max_rows, [](const ImageErrors& image) {
+        return std::to_string(image.image_id) + " " + image.image_name;
+      });
 }
 
 std::string WorstTable(const std::vector<WorstObservation>& worst) {
-  TextTable table;
-  table.AddRow({"image", "point2D_idx", "point3D_id", "error"});
-  for (const WorstObservation& observation : worst) {
-    table.AddRow(
-        {std::to_string(observation.image_id) + " " + observation.image_name,
-         std::to_string(observation.point2D_idx),
-         std::to_string(observation.point3D_id),
-         FormatNumber(observation.error_px, 4)});
-  }
-  return "\nWorst observations, pixels\n" + table.ToString();
+  return "\nWorst observations, pixels\n" +
+         TableOf({"image", "point2D_idx", "point3D_id", "error"}, worst,
+                 [](const WorstObservation& one) -> Row {
+                   return {std::to_string(one.image_id) + " " + one.image_name,
+                           one.point2D_idx, one.point3D_id,
+                           FormatNumber(one.error_px, 4)};
+                 });
 }
 
 std::string NoiseTable(const NoiseFigures& noise) {
@@ -166,10 +155,9 @@ std::string NoiseTable(const NoiseFigures& noise) {
     return text +
            "  cannot be told: no observation is checked by another one.\n";
   }
-  TextTable table;
-  std::vector<std::string> head = {"w, of so many observations at most"};
-  std::vector<std::string> own = {"this model"};
-  std::vector<std::string> gaussian = {"Gaussian noise"};
+  Row head = {"w, of so many observations at most"};
+  Row own = {"this model"};
+  Row gaussian = {"Gaussian noise"};
   for (const NoiseFigures::Quantile& one : noise.quantiles) {
     std::ostringstream share;
     share << 100 * one.share << " %";
@@ -177,7 +165,7 @@ std::string NoiseTable(const NoiseFigures& noise) {
     own.push_back(FormatNumber(one.w, 2));
     gaussian.push_back(FormatNumber(one.gaussian_w, 2));
   }
-  table.AddRow(head);
+  TextTable table(head);
   table.AddRow(own);
   table.AddRow(gaussian);
   text += "  " + FormatNumber(*noise.sigma_px, 3) +
@@ -202,21 +190,20 @@ std::string NoiseTable(const NoiseFigures& noise) {
 // Track lengths up to kLongest have a row each; the longer ones share one.
 std::string TrackTable(const ModelReport& report) {
   constexpr int64_t kLongest = 10;
-  TextTable table;
-  table.AddRow({"track length", "points"});
+  TextTable table({"track length", "points"});
   int64_t num_longer = 0;
   for (const auto& [length, num_points] : report.track_lengths) {
     if (length > kLongest) {
       num_longer += num_points;
     } else {
-      table.AddRow({std::to_string(length), std::to_string(num_points)});
+      table.AddRow({length, num_points});
     }
   }
   if (num_longer > 0) {
     const int64_t longest = report.track_lengths.rbegin()->first;
     table.AddRow(
         {std::to_string(kLongest + 1) + " to " + std::to_string(longest),
-         std::to_string(num_longer)});
+         num_longer});
   }
   return "\nTracks\n" + table.ToString() +
          std::to_string(report.num_tracks_with_repeated_image) +
@@ -224,16 +211,15 @@ std::string TrackTable(const ModelReport& report) {
 }
 
 std::string GeometryTable(const ModelReport& report) {
-  const DepthStatistics& depth = report.depth;
-  const ValueRange& angle = report.triangulation_angle_deg;
-  TextTable table;
-  table.AddRow({"", "min", "median", "max"});
-  table.AddRow({"depth, scene units", FormatNumber(depth.min, 4),
-                FormatNumber(depth.median, 4), FormatNumber(depth.max, 4)});
-  table.AddRow({"triangulation angle, degrees", FormatNumber(angle.min, 4),
-                FormatNumber(angle.median, 4), FormatNumber(angle.max, 4)});
+  TextTable table({"", "min", "median", "max"});
+  const auto add = [&](const char* name, const ValueRange& range) {
+    table.AddRow({name, FormatNumber(range.min, 4),
+                  FormatNumber(range.median, 4), FormatNumber(range.max, 4)});
+  };
+  add("depth, scene units", report.depth);
+  add("triangulation angle, degrees", report.triangulation_angle_deg);
   return "\nGeometry\n" + table.ToString() +
-         std::to_string(depth.not_positive) +
+         std::to_string(report.depth.not_positive) +
          " observations lie in or behind the plane of their camera.\n";
 }
 
@@ -242,8 +228,8 @@ std::string GeometryTable(const ModelReport& report) {
 std::string ModelTable(const ModelReport& report, int max_rows) {
   const auto num_rows = static_cast<size_t>(max_rows);
   return ColmapFigures(report.colmap) + OverallErrors(report) +
-         CameraErrorTable(report.cameras, num_rows) +
-         ImageErrorTable(report.images, num_rows) + WorstTable(report.worst) +
+         CameraErrorTable(report, num_rows) +
+         ImageErrorTable(report, num_rows) + WorstTable(report.worst) +
          NoiseTable(report.noise) + TrackTable(report) + GeometryTable(report) +
          LastingFaultLines(report.faults) +
          (report.distances ? DistanceTable(*report.distances, {"model"}) : "");
@@ -277,19 +263,6 @@ std::string ModelCsv(const ModelReport& report) {
 
 namespace {
 
-Json ColmapJson(const ColmapStatistics& colmap) {
-  return {{"num_rigs", colmap.num_rigs},
-          {"num_cameras", colmap.num_cameras},
-          {"num_frames", colmap.num_frames},
-          {"num_images", colmap.num_images},
-          {"num_registered_images", colmap.num_registered_images},
-          {"num_points", colmap.num_points},
-          {"num_observations", colmap.num_observations},
-          {"mean_track_length", colmap.mean_track_length},
-          {"mean_observations_per_image", colmap.mean_observations_per_image},
-          {"mean_reprojection_error", colmap.mean_reprojection_error}};
-}
-
 Json ImageErrorsJson(const ModelReport& report) {
   Json json = Json::array();
   for (size_t n = 0; n < report.images.size(); ++n) {
@@ -302,35 +275,26 @@ Json ImageErrorsJson(const ModelReport& report) {
   return json;
 }
 
-Json CamerasJson(const std::vector<CameraErrors>& cameras) {
-  return ListJson(cameras, [&](const CameraErrors& camera) -> Json {
-    return {{"camera_id", camera.camera_id},
-            {"num_images", camera.num_images},
-            {"pixel_error", CountedErrorJson(camera.errors)}};
-  });
+Json CameraErrorsJson(const CameraErrors& camera) {
+  return {{"camera_id", camera.camera_id},
+          {"num_images", camera.num_images},
+          {"pixel_error", CountedErrorJson(camera.errors)}};
 }
 
-Json WorstJson(const std::vector<WorstObservation>& worst) {
-  return ListJson(worst, [&](const WorstObservation& observation) -> Json {
-    return ObservationJson(observation, {{"error_px", observation.error_px}});
-  });
+Json WorstJson(const WorstObservation& worst) {
+  return ObservationJson(worst, {{"error_px", worst.error_px}});
 }
 
 Json NoiseJson(const NoiseFigures& noise) {
-  Json quantiles = ListJson(noise.quantiles, [&](const auto& one) -> Json {
-    return {{"share", one.share}, {"w", one.w}, {"gaussian_w", one.gaussian_w}};
+  Json json = KROT_JSON_OF(noise, sigma_px, cauchy_scale_px);
+  json.update(
+      KnownIf(noise.sigma_px.has_value(), KROT_JSON_OF(noise, critical_w)));
+  json.update(KROT_JSON_OF(noise, num_tested, num_above, num_half_controlled,
+                           num_uncontrolled));
+  json["w"] = ListJson(noise.quantiles, [](const auto& one) {
+    return KROT_JSON_OF(one, share, w, gaussian_w);
   });
-  const auto if_known = [&](double value) {
-    return noise.sigma_px ? Json(value) : Json();
-  };
-  return {{"sigma_px", NumberOrNull(noise.sigma_px)},
-          {"cauchy_scale_px", NumberOrNull(noise.cauchy_scale_px)},
-          {"critical_w", if_known(noise.critical_w)},
-          {"num_tested", noise.num_tested},
-          {"num_above", noise.num_above},
-          {"num_half_controlled", noise.num_half_controlled},
-          {"num_uncontrolled", noise.num_uncontrolled},
-          {"w", quantiles}};
+  return json;
 }
 
 Json TrackLengthsJson(const std::map<int64_t, int64_t>& track_lengths) {
@@ -344,36 +308,26 @@ Json TrackLengthsJson(const std::map<int64_t, int64_t>& track_lengths) {
 }  // namespace
 
 std::string ModelJson(const ModelReport& report, const std::string& version) {
-  const DepthStatistics& depth = report.depth;
-  const ValueRange& angle = report.triangulation_angle_deg;
-  const Json json = {
-      {"version", version},
-      {"command", "model_analyzer"},
-      {"colmap", ColmapJson(report.colmap)},
-      {"contradictions", ContradictionsJson(report.contradictions)},
-      {"poses", PosesJson(report.poses)},
-      {"pixel_error", CountedErrorJson(report.pixel_error)},
-      {"cameras", CamerasJson(report.cameras)},
-      {"images", ImageErrorsJson(report)},
-      {"worst", WorstJson(report.worst)},
-      {"noise", NoiseJson(report.noise)},
-      {"track_lengths", TrackLengthsJson(report.track_lengths)},
-      {"num_tracks_with_repeated_image", report.num_tracks_with_repeated_image},
-      {"num_in_camera", report.faults.num_in_camera},
-      {"num_parts", report.faults.num_parts},
-      {"distances", DistancesJson(report.distances, {"model"})},
-      {"depth",
-       {{"count", depth.count},
-        {"not_positive", depth.not_positive},
-        {"min", depth.min},
-        {"median", depth.median},
-        {"max", depth.max}}},
-      {"triangulation_angle_deg",
-       {{"count", angle.count},
-        {"min", angle.min},
-        {"median", angle.median},
-        {"max", angle.max}}},
-  };
+  Json json = {{"version", version}, {"command", "model_analyzer"}};
+  json["colmap"] = KROT_JSON_OF(
+      report.colmap, num_rigs, num_cameras, num_frames, num_images,
+      num_registered_images, num_points, num_observations, mean_track_length,
+      mean_observations_per_image, mean_reprojection_error);
+  json["contradictions"] = ContradictionsJson(report.contradictions);
+  json["poses"] = PosesJson(report.poses);
+  json["pixel_error"] = CountedErrorJson(report.pixel_error);
+  json["cameras"] = ListJson(report.cameras, CameraErrorsJson);
+  json["images"] = ImageErrorsJson(report);
+  json["worst"] = ListJson(report.worst, WorstJson);
+  json["noise"] = NoiseJson(report.noise);
+  json["track_lengths"] = TrackLengthsJson(report.track_lengths);
+  json.update(KROT_JSON_OF(report, num_tracks_with_repeated_image));
+  json.update(KROT_JSON_OF(report.faults, num_in_camera, num_parts));
+  json["distances"] = DistancesJson(report.distances, {"model"});
+  json["depth"] =
+      KROT_JSON_OF(report.depth, count, not_positive, min, median, max);
+  json["triangulation_angle_deg"] =
+      KROT_JSON_OF(report.triangulation_angle_deg, count, min, median, max);
   return ReportText(json);
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
@@ -20,9 +21,8 @@ std::string WeakPartWords(const WeakPart& part) {
   const auto [first, last] =
       std::minmax_element(part.image_names.begin(), part.image_names.end());
   return Counted(count, "image") + " (" + *first +
-         (count == 1 ? std::string()
-                     : (count == 2 ? " and " : " to ") + *last) +
-         ") " + (count == 1 ? "hangs" : "hang") + " on the rest by " +
+         TextIf(count > 1, (count == 2 ? " and " : " to ") + *last) + ") " +
+         (count == 1 ? "hangs" : "hang") + " on the rest by " +
          Counted(part.num_tracks, "track") + ", of which " +
          std::to_string(part.num_agreeing) +
          (part.num_agreeing == 1 ? " agrees" : " agree") + "; their " +
@@ -33,12 +33,11 @@ std::string WeakPartWords(const WeakPart& part) {
               ? "is held to a factor of " + FormatNumber(part.scale_factor, 2) +
                     " only"
               : std::string("is not held at all")) +
-         (part.turn_deg > 0
-              ? "; if all their rotations were turned against the rest's by " +
+         TextIf(part.turn_deg > 0,
+                "; if all their rotations were turned against the rest's by " +
                     FormatNumber(part.turn_deg, 2) + " degrees, " +
                     std::to_string(part.num_agreeing_turned) +
-                    " tracks would agree: look at the rotations"
-              : std::string());
+                    " tracks would agree: look at the rotations");
 }
 
 // For example "2 images keep few of their observations (P7.JPG 3 of 120, P9.JPG
@@ -46,22 +45,19 @@ std::string WeakPartWords(const WeakPart& part) {
 // by their first images, where rigs have several cameras. The first five are
 // named. "" without such parts.
 std::string LooseFrameWords(const std::vector<WeakPart>& parts) {
-  int64_t count = 0;
   const char* one = "image";
-  std::string names;
+  std::vector<std::string> names;
   for (const WeakPart& part : parts) {
     if (!part.is_frame) continue;
     if (part.image_names.size() > 1) one = "frame";
-    if (++count > 5) continue;
-    names += (names.empty() ? "" : ", ") + part.image_names.front() + " " +
-             std::to_string(part.num_agreeing) + " of " +
-             std::to_string(part.num_tracks);
+    names.push_back(part.image_names.front() + " " +
+                    std::to_string(part.num_agreeing) + " of " +
+                    std::to_string(part.num_tracks));
   }
-  if (count == 0) return "";
-  if (count > 5) names += ", ...";
-  const bool is_one = count == 1;
-  return Counted(count, one) + (is_one ? " keeps" : " keep") + " few of " +
-         (is_one ? "its" : "their") + " observations (" + names +
+  if (names.empty()) return "";
+  const bool is_one = names.size() == 1;
+  return Counted(names.size(), one, "keeps", "keep") + " few of " +
+         (is_one ? "its" : "their") + " observations (" + ListText(names, 5) +
          "): look at " + (is_one ? "its" : "their") +
          " rotations and matches, or leave " + (is_one ? "it" : "them") +
          " out";
@@ -75,19 +71,15 @@ std::string UnreliableSentence(const OutlierFilterSummary& summary) {
   const auto add = [&](const std::string& reason) {
     words += (words.empty() ? "" : "; ") + reason;
   };
-  std::vector<const WeakPart*> parts;
-  for (const WeakPart& part : summary.weak_parts) {
-    if (!part.is_held && !part.is_frame) parts.push_back(&part);
-  }
-  std::stable_sort(parts.begin(), parts.end(),
-                   [](const WeakPart* a, const WeakPart* b) {
-                     return a->image_names.size() > b->image_names.size();
-                   });
+  auto parts = PointersIf(summary.weak_parts, [](const WeakPart& part) {
+    return !part.is_held && !part.is_frame;
+  });
+  SortLargestFirst(
+      &parts, [](const WeakPart* part) { return part->image_names.size(); });
   const size_t num_told = std::min<size_t>(3, parts.size());
   for (size_t n = 0; n < num_told; ++n) add(WeakPartWords(*parts[n]));
   if (parts.size() > num_told) {
-    const auto more = static_cast<int64_t>(parts.size() - num_told);
-    add(Counted(more, "smaller part") + (more == 1 ? " is" : " are") +
+    add(Counted(parts.size() - num_told, "smaller part", "is", "are") +
         " not held either (--report_path lists all)");
   }
   if (!words.empty()) {
@@ -101,13 +93,13 @@ std::string UnreliableSentence(const OutlierFilterSummary& summary) {
   if (summary.is_bound_beyond_reason) {
     add("hardly anything fits: half of all errors are so large that noise "
         "would explain " +
-        FormatNumber(summary.max_error, 4) +
-        " px; look at rotations, intrinsics and matches");
+        Pixels(summary.max_error) +
+        "; look at rotations, intrinsics and matches");
   } else if (2 * num_removed > summary.num_observations) {
     add(Thousands(num_removed) + " of " + Thousands(summary.num_observations) +
         " observations, more than half, are not within " +
-        FormatNumber(summary.max_error, 4) +
-        " px; look at rotations, intrinsics and matches");
+        Pixels(summary.max_error) +
+        "; look at rotations, intrinsics and matches");
   }
   return words.empty() ? words
                        : "the positions are not to be relied on: " + words;
@@ -128,9 +120,9 @@ std::string RotationSentence(const OutlierFilterSummary& summary) {
          Counted(suspect.num_observations, "observation") +
          " above the bound.\nWith it no translations and points bring all "
          "errors below " +
-         FormatNumber(suspect.lower_bound_with, 4) +
-         " px (proved); without it they come down to " +
-         FormatNumber(suspect.max_error_without, 4) + " px.\n";
+         Pixels(suspect.lower_bound_with) +
+         " (proved); without it they come down to " +
+         Pixels(suspect.max_error_without) + ".\n";
 }
 
 // Reports the noise, and whether the errors of the kept observations have
@@ -138,10 +130,7 @@ std::string RotationSentence(const OutlierFilterSummary& summary) {
 std::string SnoopingSentences(const OutlierFilterSummary& summary) {
   if (!summary.snooping) return "";
   const SnoopingSummary& snooping = *summary.snooping;
-  const auto pixels = [](double value) {
-    return FormatNumber(value, 3) + " px";
-  };
-  const std::string noise = "noise of " + pixels(*snooping.sigma_px) +
+  const std::string noise = "noise of " + Pixels(*snooping.sigma_px, 3) +
                             " per axis (w above " +
                             FormatNumber(snooping.critical_w, 2) + ")";
   if (summary.removed.empty()) {
@@ -153,14 +142,14 @@ std::string SnoopingSentences(const OutlierFilterSummary& summary) {
   std::string text =
       "\nWhat was removed is more than " + noise +
       " explains;\nbefore the removal it was " +
-      pixels(*snooping.sigma_before_px) +
+      Pixels(*snooping.sigma_before_px, 3) +
       ". What is left is at its least squares, rotations fixed.\n";
   if (summary.num_proved > 0) {
     text += "That at least " + Counted(summary.num_proved, "observation") +
             " must go is proved: with these rotations, wherever cameras and\n"
             "points are put, so many have errors that such noise does not "
             "explain (above " +
-            pixels(snooping.max_error_px) + ", or less in short tracks).\n";
+            Pixels(snooping.max_error_px, 3) + ", or less in short tracks).\n";
   }
   const PixelErrorStatistics& before = snooping.kept_error_before;
   const PixelErrorStatistics& after = summary.pixel_error_after;
@@ -168,8 +157,8 @@ std::string SnoopingSentences(const OutlierFilterSummary& summary) {
     if (!(is > was)) return;
     text += std::string("Of what is kept, the ") + name +
             " of the errors rises from " + FormatNumber(was, 4) + " to " +
-            FormatNumber(is, 4) +
-            " px: it was not the least squares that the input minimised.\n";
+            Pixels(is) +
+            ": it was not the least squares that the input minimised.\n";
   };
   rises("mean", before.mean, after.mean);
   rises("RMS", before.rms, after.rms);
@@ -180,21 +169,18 @@ std::string SnoopingSentences(const OutlierFilterSummary& summary) {
 std::string NoiseSentence(const OutlierFilterSummary& summary) {
   if (!summary.noise) return "";
   const NoiseSummary& noise = *summary.noise;
-  const auto pixels = [](double value) {
-    return FormatNumber(value, 4) + " px";
-  };
-  std::string text = "\nGaussian noise of " + pixels(noise.limit.sigma) +
+  std::string text = "\nGaussian noise of " + Pixels(noise.limit.sigma) +
                      " (standard deviation per axis, from the median error) "
                      "explains errors up to " +
-                     pixels(noise.limit.max_error) + ".\n";
+                     Pixels(noise.limit.max_error) + ".\n";
   if (!noise.ExplainsAll()) {
     text +=
         "Without a removal no translations and points bring all errors "
         "below " +
-        pixels(noise.lower_bound) + " (proved): such noise is not all.\n";
+        Pixels(noise.lower_bound) + " (proved): such noise is not all.\n";
   } else if (noise.lowest_max_error <= noise.limit.max_error) {
     text += "Translations and points bring all errors down to " +
-            pixels(noise.lowest_max_error) + ": there is no elbow.\n";
+            Pixels(noise.lowest_max_error) + ": there is no elbow.\n";
   } else {
     text +=
         "It was not proved that some errors stay above that: there is no "
@@ -213,8 +199,7 @@ std::string NoiseSentence(const OutlierFilterSummary& summary) {
 }
 
 std::string ProfileTable(const ErrorProfileSummary& profile) {
-  TextTable table;
-  table.AddRow({"removed", "must go", "largest error", "proved"});
+  TextTable table({"removed", "must go", "largest error", "proved"});
   for (size_t n = 0; n < profile.levels.size(); ++n) {
     const ErrorProfileSummary::Level& level = profile.levels[n];
     table.AddRow({Thousands(level.num_removed), Thousands(level.num_proved),
@@ -227,17 +212,12 @@ std::string ProfileTable(const ErrorProfileSummary& profile) {
 }
 
 std::string SuspectTable(const OutlierFilterSummary& summary) {
-  if (summary.images.empty()) return "";
-  TextTable table;
-  table.AddRow({"image", "observations", "removed", "conflicts"});
-  const size_t count = std::min<size_t>(summary.images.size(), 5);
-  for (size_t n = 0; n < count; ++n) {
-    const Suspect& image = summary.images[n];
-    table.AddRow({image.name, std::to_string(image.num_observations),
-                  std::to_string(image.num_removed),
-                  std::to_string(image.num_conflicts)});
-  }
-  return "\nImages with most of them\n" + table.ToString();
+  return TitledTable("Images with most of them",
+                     {"image", "observations", "removed", "conflicts"},
+                     summary.images, 5, [](const Suspect& image) -> Row {
+                       return {image.name, image.num_observations,
+                               image.num_removed, image.num_conflicts};
+                     });
 }
 
 }  // namespace
@@ -280,8 +260,7 @@ std::string OutlierTable(const OutlierReport& report) {
             Counted(summary.num_left_alone, "observation") +
             " that had been left alone.\n";
   }
-  TextTable errors;
-  errors.AddRow({"", "before", "after"});
+  TextTable errors({"", "before", "after"});
   AddErrorColumns({summary.pixel_error_before, summary.pixel_error_after},
                   &errors);
   text += "\nReprojection errors, pixels\n" + errors.ToString();
@@ -294,13 +273,12 @@ std::string OutlierTable(const OutlierReport& report) {
   return text +
          RunSentence(
              report.run,
-             (summary.profile
-                  ? "made the profile in " +
-                        FormatNumber(summary.profile->seconds, 2) + " s, "
-                  : std::string()) +
-                 "chose " + FormatNumber(summary.seconds_removal, 2) +
-                 " s, proved " + FormatNumber(summary.seconds_conflicts, 2) +
-                 " s, solved " + FormatNumber(summary.seconds_solve, 2) + " s");
+             (summary.profile ? "made the profile in " +
+                                    Seconds(summary.profile->seconds) + ", "
+                              : "") +
+                 "chose " + Seconds(summary.seconds_removal) + ", proved " +
+                 Seconds(summary.seconds_conflicts) + ", solved " +
+                 Seconds(summary.seconds_solve));
 }
 
 }  // namespace krot::internal

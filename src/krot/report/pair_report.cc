@@ -1,5 +1,3 @@
-#include "krot/report/pair_report.h"
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -7,80 +5,70 @@
 #include "krot/analysis/epipolar.h"
 #include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
+#include "krot/report/html_page.h"
+#include "krot/report/report_json.h"
+#include "krot/report/reports.h"
 #include "krot/report/text_table.h"
 
 namespace krot::internal {
 namespace {
 
 std::string PercentOf(int64_t part, int64_t of) {
-  return of == 0 ? "-"
-                 : FormatNumber(100.0 * static_cast<double>(part) /
-                                    static_cast<double>(of),
-                                0) +
-                       " %";
+  if (of == 0) return "-";
+  return FormatNumber(
+             100.0 * static_cast<double>(part) / static_cast<double>(of), 0) +
+         " %";
 }
 
-std::vector<size_t> WronglyPosedImages(const PairCheck& check) {
-  std::vector<size_t> wrong;
-  for (size_t i = 0; i < check.images.size(); ++i) {
-    if (check.images[i].is_wrong) wrong.push_back(i);
-  }
-  return wrong;
+std::vector<const CheckedImage*> WronglyPosedImages(const PairCheck& check) {
+  return PointersIf(check.images,
+                    [](const CheckedImage& image) { return image.is_wrong; });
 }
 
 // Pairs with wrong matches, those with the most matches first.
 std::vector<const CheckedPair*> WronglyMatchedPairs(const PairCheck& check) {
-  std::vector<const CheckedPair*> wrong;
-  for (const CheckedPair& pair : check.pairs) {
-    if (pair.has_wrong_matches) wrong.push_back(&pair);
-  }
+  auto wrong = PointersIf(check.pairs, [](const CheckedPair& pair) {
+    return pair.has_wrong_matches;
+  });
   SortLargestFirst(&wrong, &CheckedPair::num_matches);
   return wrong;
 }
 
 std::string WrongImageTable(const PairCheck& check, size_t max_rows) {
-  const std::vector<size_t> wrong = WronglyPosedImages(check);
-  if (wrong.empty() || max_rows == 0) return "";
-  TextTable table;
-  table.AddRow({"image", "pairs kept", "contradictory",
-                "what is wrong, to fit best", "matches that fit if moved",
-                "if turned"});
-  for (size_t n = 0; n < std::min(wrong.size(), max_rows); ++n) {
-    const CheckedImage& image = check.images[wrong[n]];
-    table.AddRow({image.name, std::to_string(image.num_kept),
-                  std::to_string(image.num_contradictory),
-                  PoseFaultWords(image),
-                  PercentOf(image.num_agreeing_moved, image.num_matches),
-                  PercentOf(image.num_agreeing_turned, image.num_matches)});
-  }
-  return "\nImages whose poses the matches contradict\n" + table.ToString();
+  return TitledTable(
+      "Images whose poses the matches contradict",
+      {"image", "pairs kept", "contradictory", "what is wrong, to fit best",
+       "matches that fit if moved", "if turned"},
+      WronglyPosedImages(check), max_rows,
+      [](const CheckedImage* image) -> Row {
+        return {image->name,
+                image->num_kept,
+                image->num_contradictory,
+                PoseFaultWords(*image),
+                PercentOf(image->num_agreeing_moved, image->num_matches),
+                PercentOf(image->num_agreeing_turned, image->num_matches)};
+      });
 }
 
 std::string WrongPairTable(const PairCheck& check, size_t max_rows) {
   const std::vector<const CheckedPair*> wrong = WronglyMatchedPairs(check);
-  if (wrong.empty() || max_rows == 0) return "";
-  TextTable table;
-  table.AddRow({"image", "and image", "matches", "agree with the poses"});
-  for (size_t n = 0; n < std::min(wrong.size(), max_rows); ++n) {
-    table.AddRow({check.images[wrong[n]->image1].name,
-                  check.images[wrong[n]->image2].name,
-                  std::to_string(wrong[n]->num_matches),
-                  std::to_string(wrong[n]->num_agreeing)});
-  }
-  return "\nContradictory pairs of images that are not wrong: " +
-         std::to_string(wrong.size()) + "\n" + table.ToString();
+  return TitledTable("Contradictory pairs of images that are not wrong: " +
+                         std::to_string(wrong.size()),
+                     {"image", "and image", "matches", "agree with the poses"},
+                     wrong, max_rows, [&](const CheckedPair* pair) -> Row {
+                       return {check.images[pair->image1].name,
+                               check.images[pair->image2].name,
+                               pair->num_matches, pair->num_agreeing};
+                     });
 }
 
 std::string GroupTable(const PairCheck& check, size_t max_rows) {
-  if (check.groups.empty() || max_rows == 0) return "";
-  TextTable table;
-  table.AddRow({"images", "such as"});
-  for (size_t n = 0; n < std::min(check.groups.size(), max_rows); ++n) {
-    table.AddRow({std::to_string(check.groups[n].size()),
-                  check.images[check.groups[n].front()].name});
-  }
-  return "\nGroups of images that agree inside and contradict each other\n" +
-         table.ToString();
+  return TitledTable(
+      "Groups of images that agree inside and contradict each other",
+      {"images", "such as"}, check.groups, max_rows,
+      [&](const std::vector<int32_t>& group) -> Row {
+        return {group.size(), check.images[group.front()].name};
+      });
 }
 
 }  // namespace
@@ -113,55 +101,48 @@ std::string PairSentence(const PairCheck& check) {
   const std::string pairs =
       std::to_string(num_checked) + " pairs of images contradict";
   const std::string tolerance =
-      " (tolerance " + FormatNumber(check.tolerance_px, 2) + " px)";
+      " (tolerance " + Pixels(check.tolerance_px, 2) + ")";
   const auto num_images =
       static_cast<int64_t>(WronglyPosedImages(check).size());
   if (check.num_contradictory == 0) {
-    std::string sentence = "By the matches none of " +
-                           std::to_string(num_checked) +
-                           " pairs of images contradicts the poses" + tolerance;
-    if (num_images > 0) {
-      sentence +=
-          ", but " + Counted(num_images, "image") +
-          (num_images == 1 ? " is wrong and fits" : " are wrong and fit") +
-          " the matches better moved or turned";
-    }
-    return sentence + ".";
+    return "By the matches none of " + std::to_string(num_checked) +
+           " pairs of images contradicts the poses" + tolerance +
+           TextIf(num_images > 0,
+                  ", but " +
+                      Counted(num_images, "image", "is wrong and fits",
+                              "are wrong and fit") +
+                      " the matches better moved or turned") +
+           ".";
   }
   const auto num_pairs =
       static_cast<int64_t>(WronglyMatchedPairs(check).size());
   const auto num_groups = static_cast<int64_t>(check.groups.size());
-  std::string sentence = "By the matches " +
-                         std::to_string(check.num_contradictory) + " of " +
-                         pairs + " the poses" + tolerance + ": ";
-  if (num_images > 0) {
-    sentence += Counted(num_images, "image") +
-                (num_images == 1 ? " is wrong" : " are wrong");
-  } else {
-    sentence += "no image is wrong";
-  }
-  if (num_pairs > 0) {
-    sentence += ", and no image is to blame for " + Counted(num_pairs, "pair") +
-                ", whose matches are wrong, or a lens is";
-  }
-  if (num_groups > 0) {
-    sentence += "; " + std::to_string(num_groups) +
-                " groups of images agree inside and contradict each other";
-  }
-  return sentence + ".";
+  return "By the matches " + std::to_string(check.num_contradictory) + " of " +
+         pairs + " the poses" + tolerance + ": " +
+         (num_images > 0 ? Counted(num_images, "image", "is", "are")
+                         : "no image is") +
+         " wrong" +
+         TextIf(num_pairs > 0, ", and no image is to blame for " +
+                                   Counted(num_pairs, "pair") +
+                                   ", whose matches are wrong, or a lens is") +
+         TextIf(num_groups > 0,
+                "; " + std::to_string(num_groups) +
+                    " groups of images agree inside and contradict each "
+                    "other") +
+         ".";
 }
 
 std::string PairTable(const PairCheck& check, int max_rows) {
   const auto num_rows = static_cast<size_t>(max_rows);
   std::string text = PairSentence(check) + "\n";
   if (check.runner_up) {
-    std::string names;
+    std::vector<std::string> names;
     for (const int32_t i : check.runner_up->images) {
-      names += (names.empty() ? "" : ", ") + check.images[i].name;
+      names.push_back(check.images[i].name);
     }
     text += "The matches cannot tell this from another explanation: " +
             (names.empty() ? "no image is wrong, their matches are"
-                           : "wrong images are " + names) +
+                           : "wrong images are " + ListText(names)) +
             ".\n";
   }
   text +=
@@ -170,6 +151,87 @@ std::string PairTable(const PairCheck& check, int max_rows) {
       "within the noise.\n";
   return text + GroupTable(check, num_rows) + WrongImageTable(check, num_rows) +
          WrongPairTable(check, num_rows);
+}
+
+namespace {
+
+const char* PairStateName(PairState state) {
+  using Enum = PairState;
+  return NameIn<Enum>({{Enum::kNotChecked, "not checked"},
+                       {Enum::kKept, "kept"},
+                       {Enum::kContradictory, "contradictory"},
+                       {Enum::kUndecided, "undecided"}},
+                      state);
+}
+
+const char* PoseFaultName(PoseFault fault) {
+  using Enum = PoseFault;
+  return NameIn<Enum>({{Enum::kNone, "none"},
+                       {Enum::kPosition, "position"},
+                       {Enum::kRotation, "rotation"},
+                       {Enum::kUnclear, "unclear"}},
+                      fault);
+}
+
+Json NamesJson(const std::vector<int32_t>& images, const PairCheck& check) {
+  return ListJson(images, [&](int32_t i) { return check.images[i].name; });
+}
+
+Json ExplanationJson(const Explanation& explanation, const PairCheck& check) {
+  return {{"images", NamesJson(explanation.images, check)},
+          {"cost_matches", explanation.cost}};
+}
+
+Json CheckedImageJson(const CheckedImage& image) {
+  Json json = {{"image_id", image.image_id},
+               {"image_name", image.name},
+               {"num_kept_pairs", image.num_kept},
+               {"num_contradictory_pairs", image.num_contradictory},
+               {"num_undecided_pairs", image.num_undecided}};
+  json.update(
+      KROT_JSON_OF(image, kept_matches, contradictory_matches, is_wrong));
+  json["fault"] = image.is_wrong ? Json(PoseFaultName(image.fault)) : Json();
+  json.update(KROT_JSON_OF(image, num_matches, num_agreeing_moved,
+                           num_agreeing_turned, moved_by, turned_by_deg,
+                           is_rotation_proved_wrong));
+  return json;
+}
+
+Json CheckedPairJson(const CheckedPair& pair, const PairCheck& check) {
+  Json json = {{"image1", check.images[pair.image1].name},
+               {"image2", check.images[pair.image2].name},
+               {"state", PairStateName(pair.state)}};
+  json.update(KROT_JSON_OF(pair, num_matches, num_agreeing, median_error_px));
+  json.update(KnownIf(pair.state == PairState::kContradictory,
+                      KROT_JSON_OF(pair, num_explained, most_explained)));
+  json["has_wrong_matches"] = pair.has_wrong_matches;
+  return json;
+}
+
+}  // namespace
+
+Json PairJson(const PairCheck& check) {
+  const auto explanation = [&](const Explanation& of) {
+    return ExplanationJson(of, check);
+  };
+  Json json = {{"verdict", PairSentence(check)},
+               {"noise_px", check.noise_px},
+               {"tolerance_px", check.tolerance_px},
+               {"num_kept_pairs", check.num_kept},
+               {"num_contradictory_pairs", check.num_contradictory},
+               {"num_undecided_pairs", check.num_undecided},
+               {"num_not_checked_pairs", check.num_not_checked},
+               {"num_without_ray", check.num_without_ray},
+               {"cheapest", explanation(check.cheapest)},
+               {"runner_up", JsonIf(check.runner_up, explanation)},
+               {"is_cheapest_proved", check.is_cheapest_proved}};
+  json["groups"] = ListJson(
+      check.groups, [&](const auto& group) { return NamesJson(group, check); });
+  json["images"] = ListJson(check.images, CheckedImageJson);
+  json["pairs"] = ListJson(check.pairs, [&](const CheckedPair& pair) {
+    return CheckedPairJson(pair, check);
+  });
+  return json;
 }
 
 namespace {
@@ -183,8 +245,8 @@ class PairView {
       : model_(model),
         database_(database),
         check_(check),
-        geometries_(ImageGeometries(model)) {
-    for (const ImageGeometry& geometry : geometries_) {
+        rays_(model, database) {
+    for (const ImageGeometry& geometry : rays_.geometries) {
       const Camera& camera = model.cameras[geometry.camera];
       scales_.push_back(kPairViewSide / static_cast<double>(std::max<uint64_t>(
                                             {1, camera.width, camera.height})));
@@ -193,8 +255,8 @@ class PairView {
 
   Json Run() const {
     Json images = Json::array();
-    for (size_t i = 0; i < model_.images.size(); ++i) {
-      const Camera& camera = model_.cameras[geometries_[i].camera];
+    for (size_t i = 0; i < scales_.size(); ++i) {
+      const Camera& camera = model_.cameras[rays_.geometries[i].camera];
       const auto side = [&](uint64_t pixels) {
         return std::max(1L,
                         std::lround(scales_[i] * static_cast<double>(pixels)));
@@ -213,18 +275,8 @@ class PairView {
  private:
   bool Agrees(const VerifiedPair& pair, const std::array<uint32_t, 2>& match,
               const Eigen::Vector3d& baseline) const {
-    std::vector<PixelRay> rays;
-    for (const int side : {0, 1}) {
-      const int32_t image = side == 0 ? pair.image1 : pair.image2;
-      const auto ray = RayOf(model_.cameras[geometries_[image].camera],
-                             database_.keypoints[image][match[side]]);
-      if (!ray) return false;
-      const Eigen::Matrix3d world_from_cam =
-          geometries_[image].cam_from_world.rotation.transpose();
-      rays.push_back(world_from_cam * *ray);
-    }
-    return EpipolarMatch(rays[0], rays[1]).ErrorPx(baseline) <=
-           check_.tolerance_px;
+    const auto condition = rays_.ConditionOf(pair, match);
+    return condition && condition->ErrorPx(baseline) <= check_.tolerance_px;
   }
 
   Json MatchesOf(const VerifiedPair& pair, const CheckedPair& checked) const {
@@ -232,8 +284,8 @@ class PairView {
     const size_t shown = std::min(most, pair.matches.size());
     const bool is_checked = checked.state != PairState::kNotChecked;
     const Eigen::Vector3d baseline =
-        is_checked ? Center(geometries_[pair.image2].cam_from_world) -
-                         Center(geometries_[pair.image1].cam_from_world)
+        is_checked ? Center(rays_.geometries[pair.image2].cam_from_world) -
+                         Center(rays_.geometries[pair.image1].cam_from_world)
                    : Eigen::Vector3d(Eigen::Vector3d::Zero());
     Json matches = Json::array();
     for (size_t n = 0; n < shown; ++n) {
@@ -254,7 +306,7 @@ class PairView {
   const Model& model_;
   const Database& database_;
   const PairCheck& check_;
-  const std::vector<ImageGeometry> geometries_;
+  const MatchRays rays_;
   std::vector<double> scales_;  // pixels on the page per pixel of the image
 };
 
@@ -280,7 +332,7 @@ std::string TrackSentence(const TrackReport& report) {
          Thousands(report.num_observations) + " observations: tracks of " +
          FormatNumber(MeanTrackLength(report), 2) +
          " images, root mean square error " +
-         FormatNumber(report.pixel_error.rms, 3) + " px.";
+         Pixels(report.pixel_error.rms, 3) + ".";
 }
 
 std::string TrackTable(const TrackReport& report) {
@@ -307,30 +359,25 @@ std::string TrackTable(const TrackReport& report) {
   }
   return text + "\n" +
          RunSentence(report.run,
-                     "triangulated " +
-                         FormatNumber(report.seconds_triangulate, 2) + " s");
+                     "triangulated " + Seconds(report.seconds_triangulate));
 }
 
 Json MatchesJson(const MatchTracksSummary& summary) {
-  return {{"num_pairs", summary.num_pairs},
-          {"num_contradictory_pairs", summary.num_contradictory_pairs},
-          {"num_matches", summary.num_matches},
-          {"num_disagreeing_matches", summary.num_disagreeing},
-          {"num_components", summary.num_components},
-          {"num_image_twice", summary.num_image_twice},
-          {"num_in_conflict", summary.num_in_conflict},
-          {"num_two_views", summary.num_two_views},
-          {"num_narrow", summary.num_narrow}};
+  Json json =
+      KROT_JSON_OF(summary, num_pairs, num_contradictory_pairs, num_matches);
+  json["num_disagreeing_matches"] = summary.num_disagreeing;
+  json.update(KROT_JSON_OF(summary, num_components, num_image_twice,
+                           num_in_conflict, num_two_views, num_narrow));
+  return json;
 }
 
 std::string MatchesSentence(const MatchTracksSummary& summary) {
   return "The points come from the matches of " +
          Counted(summary.num_pairs, "pair") + " of images" +
-         (summary.num_contradictory_pairs > 0
-              ? "; those of " +
+         TextIf(summary.num_contradictory_pairs > 0,
+                "; those of " +
                     Counted(summary.num_contradictory_pairs, "other pair") +
-                    " contradict the positions and are not used"
-              : std::string()) +
+                    " contradict the positions and are not used") +
          ".\n";
 }
 

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
@@ -59,16 +58,16 @@ template <typename NameOf>
 std::string CorrelationWords(const Eigen::MatrixXd& covariance,
                              const NameOf& name_of) {
   const Eigen::VectorXd sigma = Deviations(covariance);
-  std::string words;
+  std::vector<std::string> words;
   for (Eigen::Index a = 0; a < sigma.size(); ++a) {
     for (Eigen::Index b = 0; b < a; ++b) {
       const double value = covariance(a, b) / (sigma[a] * sigma[b]);
       if (!(std::abs(value) > 0.95)) continue;
-      words += (words.empty() ? "" : ", ") + name_of(b) + "-" + name_of(a) +
-               " " + FormatNumber(100 * value, 1) + " %";
+      words.push_back(name_of(b) + "-" + name_of(a) + " " +
+                      FormatNumber(100 * value, 1) + " %");
     }
   }
-  return words;
+  return ListText(words);
 }
 
 // The number of decimals that shows two digits of the median deviation.
@@ -81,17 +80,11 @@ int DecimalsFor(std::vector<double> sigmas) {
   return static_cast<int>(std::clamp(digits, 0.0, 12.0));
 }
 
-std::vector<std::string> Cells(const Eigen::VectorXd& values, int decimals) {
-  std::vector<std::string> cells;
+// Adds a cell for each coordinate.
+void Append(const Eigen::VectorXd& values, int decimals, Row* row) {
   for (const double value : values) {
-    cells.push_back(FormatNumber(value, decimals));
+    row->push_back(FormatNumber(value, decimals));
   }
-  return cells;
-}
-
-void Append(const std::vector<std::string>& more,
-            std::vector<std::string>* cells) {
-  cells->insert(cells->end(), more.begin(), more.end());
 }
 
 std::string ResidualName(const NamedObservation& o) {
@@ -147,8 +140,7 @@ std::string CameraSection(const AdjustmentPrecision& precision,
     const std::vector<std::string> names = ParamNames(camera.model_id);
     text += "Camera " + std::to_string(camera.id) + ", " +
             std::string(FindCameraModel(camera.model_id)->name) + ", pixels\n";
-    TextTable table;
-    table.AddRow({"parameter", "value", "std. dev."});
+    TextTable table({"parameter", "value", "std. dev."});
     for (size_t n = 0; n < one.params.size(); ++n) {
       const double sigma =
           one.covariance
@@ -182,21 +174,19 @@ std::string ImageSection(const AdjustmentPrecision& precision,
     lengths.insert(lengths.end(), sigma.data() + 3, sigma.data() + 6);
   }
   const int decimals = DecimalsFor(std::move(lengths));
-  TextTable table;
-  table.AddRow({"image", "points", "rms vx", "rms vy", "max v", "X", "Y", "Z",
-                "sX", "sY", "sZ", "srx, deg", "sry, deg", "srz, deg"});
+  TextTable table({"image", "points", "rms vx", "rms vy", "max v", "X", "Y",
+                   "Z", "sX", "sY", "sZ", "srx, deg", "sry, deg", "srz, deg"});
   std::string correlations;
   for (const ImagePrecision& image : precision.images) {
-    std::vector<std::string> cells = {model.images[image.image].name,
-                                      Thousands(image.num_observations)};
-    Append(Cells(image.rms_px, 3), &cells);
+    Row cells = {model.images[image.image].name,
+                 Thousands(image.num_observations)};
+    Append(image.rms_px, 3, &cells);
     cells.push_back(FormatNumber(image.max_px, 3));
-    Append(Cells(Center(geometries[image.image].cam_from_world), decimals),
-           &cells);
+    Append(Center(geometries[image.image].cam_from_world), decimals, &cells);
     Eigen::VectorXd sigma = Eigen::VectorXd::Constant(6, kNaN);
     if (image.covariance) sigma = Deviations(*image.covariance);
-    Append(Cells(sigma.tail(3), decimals), &cells);
-    Append(Cells(sigma.head(3) * kDegreesPerRadian, 5), &cells);
+    Append(sigma.tail(3), decimals, &cells);
+    Append(sigma.head(3) * kDegreesPerRadian, 5, &cells);
     table.AddRow(std::move(cells));
     if (!image.covariance) continue;
     const std::string words = CorrelationWords(
@@ -205,11 +195,8 @@ std::string ImageSection(const AdjustmentPrecision& precision,
     if (words.empty()) continue;
     correlations += "  " + model.images[image.image].name + ": " + words + "\n";
   }
-  std::string text = table.ToString();
-  if (!correlations.empty()) {
-    text += "Correlations above 95 %\n" + correlations;
-  }
-  return text;
+  return table.ToString() + TextIf(!correlations.empty(),
+                                   "Correlations above 95 %\n" + correlations);
 }
 
 std::string ReliabilitySection(const AdjustmentPrecision& precision,
@@ -224,69 +211,59 @@ std::string ReliabilitySection(const AdjustmentPrecision& precision,
                 Thousands(figures.num_uncontrolled)});
   table.AddRow({"critical value of w", FormatNumber(figures.critical_w, 2)});
   table.AddRow({"image points above it", Thousands(figures.num_above)});
-  TextTable worst;
-  worst.AddRow({"image", "2D point", "point3D_id", "vx", "vy", "rx", "ry", "w",
-                "detectable, px"});
-  for (const NamedObservation& o : figures.LargestW()) {
-    const ObservationPrecision& of = *o.precision;
-    worst.AddRow({o.image->name, std::to_string(o.point2D_idx),
-                  std::to_string(o.point3D_id),
-                  FormatNumber(of.residual_px.x(), 3),
-                  FormatNumber(of.residual_px.y(), 3),
-                  FormatNumber(of.redundancy.x(), 3),
-                  FormatNumber(of.redundancy.y(), 3), FormatNumber(o.w, 2),
-                  FormatNumber(o.DetectablePx(precision.sigma0_px), 2)});
-  }
   return table.ToString() + "Image points with the largest w\n" +
-         worst.ToString();
+         TableOf({"image", "2D point", "point3D_id", "vx", "vy", "rx", "ry",
+                  "w", "detectable, px"},
+                 figures.LargestW(), [&](const NamedObservation& o) {
+                   Row cells = {o.image->name, o.point2D_idx, o.point3D_id};
+                   Append(o.precision->residual_px, 3, &cells);
+                   Append(o.precision->redundancy, 3, &cells);
+                   cells.push_back(FormatNumber(o.w, 2));
+                   cells.push_back(
+                       FormatNumber(o.DetectablePx(precision.sigma0_px), 2));
+                   return cells;
+                 });
 }
 
 std::string PointSections(const AdjustmentPrecision& precision,
                           const PrecisionFigures& figures, const Model& model) {
-  std::ostringstream text;
-  text << "\nRays per object point\n";
-  TextTable rays;
-  rays.AddRow({"rays", "points"});
-  for (const auto& [num_rays, num_points] : figures.num_with_rays) {
-    rays.AddRow({std::to_string(num_rays), Thousands(num_points)});
-  }
-  text << rays.ToString() << "\nIntersection angles, mean "
-       << FormatNumber(figures.mean_angle_deg, 1)
-       << " deg; the smallest (of the two rays nearest to a right angle)\n";
-  TextTable angles;
-  angles.AddRow({"point3D_id", "rays", "angle, deg"});
-  for (const PointPrecision& point : figures.SmallestAngles()) {
-    angles.AddRow({std::to_string(model.points3D[point.point].id),
-                   std::to_string(point.num_rays),
-                   FormatNumber(point.angle_deg, 2)});
-  }
-  text << angles.ToString();
+  const auto begin_row = [&](const PointPrecision& point) -> Row {
+    return {model.points3D[point.point].id, point.num_rays,
+            FormatNumber(point.angle_deg, 2)};
+  };
+  std::string text =
+      "\nRays per object point\n" +
+      TableOf({"rays", "points"}, figures.num_with_rays,
+              [](const auto& entry) -> Row {
+                return {entry.first, Thousands(entry.second)};
+              }) +
+      "\nIntersection angles, mean " + FormatNumber(figures.mean_angle_deg, 1) +
+      " deg; the smallest (of the two rays nearest to a right angle)\n" +
+      TableOf({"point3D_id", "rays", "angle, deg"}, figures.SmallestAngles(),
+              begin_row);
   std::vector<double> lengths;
   for (const PointPrecision& point : precision.points) {
     lengths.insert(lengths.end(), point.sigma.data(), point.sigma.data() + 3);
   }
   const int decimals = DecimalsFor(std::move(lengths));
-  text << "\nObject points";
+  text += "\nObject points";
   if (precision.has_covariances) {
-    const auto cells = Cells(figures.RmsSigma(), decimals);
-    text << "; RMS of the standard deviations: sX " << cells[0] << ", sY "
-         << cells[1] << ", sZ " << cells[2];
+    const Vector3d rms = figures.RmsSigma();
+    text += "; RMS of the standard deviations: sX " +
+            FormatNumber(rms.x(), decimals) + ", sY " +
+            FormatNumber(rms.y(), decimals) + ", sZ " +
+            FormatNumber(rms.z(), decimals);
   }
-  text << '\n';
-  TextTable table;
-  table.AddRow({"point3D_id", "rays", "angle, deg", "rms v, px", "X", "Y", "Z",
-                "sX", "sY", "sZ"});
-  for (const PointPrecision& point : precision.points) {
-    const Point3D& of = model.points3D[point.point];
-    std::vector<std::string> cells = {
-        std::to_string(of.id), std::to_string(point.num_rays),
-        FormatNumber(point.angle_deg, 2), FormatNumber(point.rms_px, 3)};
-    Append(Cells(of.xyz, decimals), &cells);
-    Append(Cells(point.sigma, decimals), &cells);
-    table.AddRow(std::move(cells));
-  }
-  text << table.ToString();
-  return text.str();
+  return text + "\n" +
+         TableOf({"point3D_id", "rays", "angle, deg", "rms v, px", "X", "Y",
+                  "Z", "sX", "sY", "sZ"},
+                 precision.points, [&](const PointPrecision& point) {
+                   Row cells = begin_row(point);
+                   cells.push_back(FormatNumber(point.rms_px, 3));
+                   Append(model.points3D[point.point].xyz, decimals, &cells);
+                   Append(point.sigma, decimals, &cells);
+                   return cells;
+                 });
 }
 
 // `in_deviations`: with a column of the differences in standard deviations.
@@ -299,22 +276,21 @@ std::string SurveySection(const SurveyComparison& survey, bool in_deviations) {
   }
   const int decimals = DecimalsFor(std::move(lengths)) + 1;
   TextTable table;
-  const auto add = [&](std::vector<std::string> cells,
-                       const std::string& deviations) {
+  const auto add = [&](Row cells, const std::string& deviations) {
     if (in_deviations) cells.push_back(deviations);
     table.AddRow(std::move(cells));
   };
   add({"name", "X", "Y", "Z", "dX", "dY", "dZ", "length"}, "in sigma");
   for (const SurveyComparison::Place& place : survey.places) {
-    std::vector<std::string> cells = {place.name};
-    Append(Cells(place.surveyed, decimals), &cells);
-    Append(Cells(place.difference, decimals), &cells);
+    Row cells = {place.name};
+    Append(place.surveyed, decimals, &cells);
+    Append(place.difference, decimals, &cells);
     cells.push_back(FormatNumber(place.difference.norm(), decimals));
     add(std::move(cells), FormatNumber(place.deviations, 1));
   }
   squares /= static_cast<double>(survey.places.size());
-  std::vector<std::string> cells = {"RMS", "", "", ""};
-  Append(Cells(squares.cwiseSqrt(), decimals), &cells);
+  Row cells = {"RMS", "", "", ""};
+  Append(squares.cwiseSqrt(), decimals, &cells);
   cells.push_back(FormatNumber(survey.rms, decimals));
   add(std::move(cells), "");
   return table.ToString();
@@ -343,8 +319,7 @@ std::string SurveySections(const AdjustmentReport& report) {
 std::string AdjustmentText(const AdjustmentReport& report, const Model& model) {
   const AdjustModelSummary& summary = report.summary;
   std::string text = "KROT " + report.run.version + ", bundle adjustment\n" +
-                     AdjustmentTable(report);
-  text += SurveySections(report);
+                     AdjustmentTable(report) + SurveySections(report);
   if (!summary.precision) return text;
   const AdjustmentPrecision& precision = *summary.precision;
   const PrecisionFigures figures(precision, model);
@@ -373,15 +348,13 @@ std::string AdjustmentText(const AdjustmentReport& report, const Model& model) {
 }
 
 std::string PrecisionSentence(const AdjustmentPrecision& precision) {
-  return "sigma0 " + FormatNumber(precision.sigma0_px, 4) +
-         " px a posteriori, redundancy " + Thousands(precision.redundancy) +
-         ": " +
+  return "sigma0 " + Pixels(precision.sigma0_px) +
+         " a posteriori, redundancy " + Thousands(precision.redundancy) + ": " +
          Thousands(2 * static_cast<int64_t>(precision.observations.size()) +
                    3 * precision.num_positions) +
          " observed coordinates" +
-         (precision.num_distances > 0
-              ? " and " + Counted(precision.num_distances, "distance")
-              : "") +
+         TextIf(precision.num_distances > 0,
+                " and " + Counted(precision.num_distances, "distance")) +
          ", " + Counted(precision.num_unknowns, "unknown") + ", datum defect " +
          std::to_string(precision.datum_defect) + ".";
 }

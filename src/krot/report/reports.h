@@ -7,13 +7,12 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json_fwd.hpp>
-
 #include "krot/analysis/model_input.h"
-#include "krot/analysis/model_parts.h"
 #include "krot/analysis/model_statistics.h"
+#include "krot/analysis/noise.h"
 #include "krot/check.h"
 #include "krot/convert/certificate_file.h"
+#include "krot/database.h"
 #include "krot/model.h"
 #include "krot/model/model_checks.h"
 #include "krot/model/model_io.h"
@@ -53,15 +52,6 @@ std::string AdjustmentJson(const AdjustmentReport& report, const Model& model);
 // A protocol for people to read; if the precision was computed, with that of
 // every camera, image and point.
 std::string AdjustmentText(const AdjustmentReport& report, const Model& model);
-
-// The precision for report.json: sigma0, redundancy, standard deviations and
-// reliability.
-nlohmann::ordered_json PrecisionJson(const AdjustmentPrecision& precision,
-                                     const Model& model);
-// Null if there are none.
-nlohmann::ordered_json SurveyJson(const std::optional<SurveyComparison>& survey,
-                                  bool are_points);
-std::string PrecisionSentence(const AdjustmentPrecision& precision);
 
 // Says why there is no model below the cap, and which bound proves it, if one
 // does. Requires the termination kInfeasibleStart.
@@ -119,6 +109,17 @@ struct CheckReport {
   std::string database_path;
 };
 
+// For example "By the matches 39 of 249 pairs of images contradict the poses: 3
+// images are wrong."
+std::string PairSentence(const PairCheck& check);
+
+// What is wrong with an image's pose: "rotation: turned by 0.31 degrees".
+std::string PoseFaultWords(const CheckedImage& image);
+
+// For the terminal: PairSentence, wrong images and pairs with wrong matches, at
+// most max_rows of each.
+std::string PairTable(const PairCheck& check, int max_rows);
+
 // Why an image has its verdict; empty if it is fine.
 std::string ReasonOf(const ModelCheck& check, const ImageCheck& image);
 
@@ -140,12 +141,10 @@ std::string SigmaText(double sigma);
 // What too few tracks tie to the rest of a model; "" if all is tied.
 std::string PartsSentence(const ModelCheck& check);
 std::string PartTable(const ModelCheck& check, size_t max_rows);
-nlohmann::ordered_json PartsJson(const ModelCheck& check);
 // What is wrong with cameras that images share, and what to do; requires one at
 // least.
 std::string CamerasSentence(const ModelCheck& check);
 std::string CameraTable(const ModelCheck& check, size_t max_rows);
-nlohmann::ordered_json CamerasJson(const ModelCheck& check);
 
 // What the model still has that no adjustment mends, and what helps: a line for
 // each; "" if there is nothing.
@@ -245,9 +244,6 @@ std::string BracketSentence(const OutlierFilterSummary& summary);
 // images. Empty if they are reliable, or not from nothing.
 std::string UnreliableSentence(const OutlierFilterSummary& summary);
 
-// OutlierFilterSummary::weak_parts as an array: [{"image_names": ..}].
-nlohmann::ordered_json WeakPartsJson(const OutlierFilterSummary& summary);
-
 // For the terminal: BracketSentence, errors before and after, and the suspects.
 std::string OutlierTable(const OutlierReport& report);
 
@@ -280,6 +276,29 @@ struct SolveReport {
   bool is_in_position_frame = false;
   std::optional<DistanceReport> distances;  // before and after
 };
+
+// What one run of `krot point_triangulator --database_path` produced.
+struct TrackReport {
+  RunRecord run;
+  MatchTracksSummary summary;
+  int64_t num_points = 0;
+  int64_t num_observations = 0;
+  PixelErrorStatistics pixel_error;
+  double seconds_triangulate = 0;  // wall clock
+};
+
+// For example "9,128 points with 52,311 observations: tracks of 5.73 images,
+// root mean square error 0.71 px."
+std::string TrackSentence(const TrackReport& report);
+
+// For the terminal: TrackSentence, and what became of the matches.
+std::string TrackTable(const TrackReport& report);
+
+// For example "The points come from the matches of 249 pairs of images."
+std::string MatchesSentence(const MatchTracksSummary& summary);
+
+// report.json; docs/cli.md lists its keys.
+std::string TrackJson(const TrackReport& report);
 
 // A row for each known distance: its known length, its length in each model, in
 // metres by that model's scale, and whether it contradicts the others. `heads`

@@ -13,37 +13,27 @@
 namespace krot::internal {
 namespace {
 
-constexpr size_t kNumNamed = 5;
-
-// The first few items, separated by commas.
+// The first five of the items.
 template <typename Item, typename Name>
 std::string FirstFew(const std::vector<Item>& items, const Name& name) {
-  std::string list;
-  for (size_t n = 0; n < std::min(items.size(), kNumNamed); ++n) {
-    list += (n == 0 ? "" : ", ") + name(items[n]);
-  }
-  return list + (items.size() > kNumNamed ? ", ..." : "");
-}
-
-// "1 image is", "2 images are".
-std::string CountedAre(size_t count, const std::string& noun) {
-  return Counted(static_cast<int64_t>(count), noun) +
-         (count == 1 ? " is" : " are");
+  std::vector<std::string> names;
+  for (const Item& item : items) names.push_back(name(item));
+  return ListText(std::move(names), 5);
 }
 
 std::string NameOf(const LooseImage& image) {
-  const std::string moved =
-      std::isfinite(image.moved)
-          ? ", moved by " + FormatLength(image.moved) + " units"
-          : "";
   return image.image_name + " (" +
-         Counted(image.num_observations, "observation") + moved + ")";
+         Counted(image.num_observations, "observation") +
+         TextIf(std::isfinite(image.moved),
+                ", moved by " + FormatLength(image.moved) + " units") +
+         ")";
 }
 
 std::string LooseImagesSentence(const std::vector<LooseImage>& images) {
   if (images.empty()) return "";
   const std::string their = images.size() == 1 ? "its" : "their";
-  return CountedAre(images.size(), "image") + " not held in place: " + their +
+  return Counted(images.size(), "image", "is", "are") +
+         " not held in place: " + their +
          " observations fit as well from farther away. Check " + their +
          " matches. Moved no farther than needed: " +
          FirstFew(images, &NameOf) + ".\n";
@@ -63,7 +53,7 @@ std::string LoosePointsSentence(const std::vector<LoosePoint>& points) {
   for (const LoosePoint& point : points) {
     farthest = std::max(farthest, point.moved);
   }
-  return CountedAre(points.size(), "point") +
+  return Counted(points.size(), "point", "is", "are") +
          " not determined: the rays are parallel up to noise, and any distance "
          "fits. Moved by at most " +
          FormatLength(farthest) + " units: point3D_id " +
@@ -81,10 +71,9 @@ std::string FitWords(const char* whose,
     return "most of " + std::string(whose) + " observations do not project";
   }
   return std::string(whose) + " observations have a median error of " +
-         FormatNumber(fit->median, 4) + " px" +
-         (std::isfinite(fit->max)
-              ? " and a largest of " + FormatNumber(fit->max, 4) + " px"
-              : std::string());
+         Pixels(fit->median) +
+         TextIf(std::isfinite(fit->max),
+                " and a largest of " + Pixels(fit->max));
 }
 
 std::string FollowedWords(const std::string& followed) {
@@ -101,14 +90,13 @@ std::string FollowedWords(const std::string& followed) {
 
 std::string LeftOutWords(const LeftOutCounts& left_out) {
   int64_t total = 0;
-  std::string list;
+  std::vector<std::string> reasons;
   for (const auto& [reason, count] : left_out) {
     total += count;
-    if (count == 0) continue;
-    list += (list.empty() ? "" : ", ") + reason + " " + std::to_string(count);
+    if (count > 0) reasons.push_back(reason + " " + std::to_string(count));
   }
   return Counted(total, "observation") + " left out" +
-         (list.empty() ? "" : " (" + list + ")");
+         TextIf(!reasons.empty(), " (" + ListText(reasons) + ")");
 }
 
 std::string NothingToDoSentence(const std::string& what,
@@ -127,10 +115,9 @@ std::string LooseSentences(const LooseParts& loose, int64_t num_images) {
   }
   const auto num_loose = static_cast<int64_t>(loose.images.size());
   return LooseImagesSentence(undetermined) + RunawaysSentence(runaways) +
-         (num_loose > 0 && num_loose < num_images
-              ? "The place and the size of the model are those of the other " +
-                    Counted(num_images - num_loose, "image") + ".\n"
-              : "") +
+         TextIf(num_loose > 0 && num_loose < num_images,
+                "The place and the size of the model are those of the other " +
+                    Counted(num_images - num_loose, "image") + ".\n") +
          LoosePointsSentence(loose.points);
 }
 
@@ -161,10 +148,9 @@ void RequireSettled(const std::string& path,
 std::string WorseImagesWords(const std::pair<double, double>& max_px) {
   return "by the images' side, which COLMAP's bundle adjustment reads, the "
          "largest error rises from " +
-         FormatNumber(max_px.first, 4) + " px to " +
-         (std::isfinite(max_px.second)
-              ? FormatNumber(max_px.second, 4) + " px"
-              : std::string("points that do not project"));
+         Pixels(max_px.first) + " to " +
+         (std::isfinite(max_px.second) ? Pixels(max_px.second)
+                                       : "points that do not project");
 }
 
 std::string WholeCollapseWords(const Collapse& collapse) {
@@ -210,11 +196,10 @@ std::string TurnWords(double median_deg, double largest_deg,
 
 std::string ErrorWords(const RotationInput& input) {
   if (!input.median_error_before) return "";
-  return "; the median error was " +
-         FormatNumber(*input.median_error_before, 2) + " px and is " +
-         (input.median_error_after
-              ? FormatNumber(*input.median_error_after, 2) + " px"
-              : std::string("infinite")) +
+  return "; the median error was " + Pixels(*input.median_error_before, 2) +
+         " and is " +
+         (input.median_error_after ? Pixels(*input.median_error_after, 2)
+                                   : "infinite") +
          " before anything moves";
 }
 
@@ -290,10 +275,9 @@ void RecordEnd(const Timer& timer, int num_threads, RunRecord* run) {
 }
 
 std::string RunSentence(const RunRecord& run, const std::string& middle) {
-  return "Read " + FormatNumber(run.seconds_read, 2) + " s, " + middle +
-         ", wrote " + FormatNumber(run.seconds_write, 2) + " s; " +
-         FormatNumber(run.seconds_total, 2) + " s in all on " +
-         Counted(run.threads, "thread") + ", " +
+  return "Read " + Seconds(run.seconds_read) + ", " + middle + ", wrote " +
+         Seconds(run.seconds_write) + "; " + Seconds(run.seconds_total) +
+         " in all on " + Counted(run.threads, "thread") + ", " +
          FormatBytes(run.peak_memory_bytes) + " at most.\n";
 }
 

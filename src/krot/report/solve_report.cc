@@ -3,7 +3,6 @@
 #include <optional>
 
 #include "krot/base/numbers.h"
-#include "krot/report/pair_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/reports.h"
 #include "krot/report/text_table.h"
@@ -26,8 +25,8 @@ std::string NothingToSolveSentence(const SolveSummary& summary) {
 std::vector<Point3DId> SameImageInSupport(const SolveSummary& summary) {
   std::vector<Point3DId> points;
   for (const SupportObservation& o : summary.support) {
-    if (!o.has_image_twice) continue;
-    if (std::find(points.begin(), points.end(), o.point3D_id) == points.end()) {
+    if (o.has_image_twice &&
+        std::find(points.begin(), points.end(), o.point3D_id) == points.end()) {
       points.push_back(o.point3D_id);
     }
   }
@@ -138,74 +137,52 @@ std::optional<double> LargestTwin(const SolveSummary& summary) {
   return summary.largest_twin_error;
 }
 
-Json JointIterationsJson(const std::vector<JointIteration>& iterations) {
-  return ListJson(iterations, [&](const JointIteration& iteration) -> Json {
-    return {{"method", iteration.target ? "feasible_start" : "joint"},
-            {"cost", NumberOrNull(iteration.cost)},
-            {"lower_bound", NumberOrNull(iteration.lower_bound)},
-            {"gap", NumberOrNull(iteration.gap)},
-            {"target", NumberOrNull(iteration.target)},
-            {"seconds", iteration.seconds}};
-  });
+Json JointIterationJson(const JointIteration& iteration) {
+  return Joined(
+      {{"method", iteration.target ? "feasible_start" : "joint"}},
+      KROT_JSON_OF(iteration, cost, lower_bound, gap, target, seconds));
 }
 
-Json RoundsJson(const std::vector<Round>& rounds) {
-  return ListJson(rounds, [&](const Round& round) -> Json {
-    return {{"linear_cost", round.linear_cost},
-            {"linear_lower_bound", NumberOrNull(round.linear_lower_bound)},
-            {"step", round.step},
-            {"cost", round.cost},
-            {"lower_bound", NumberOrNull(round.lower_bound)},
-            {"seconds", round.seconds}};
-  });
+Json RoundJson(const Round& round) {
+  return KROT_JSON_OF(round, linear_cost, linear_lower_bound, step, cost,
+                      lower_bound, seconds);
 }
 
-Json SupportJson(const std::vector<SupportObservation>& support) {
-  return ListJson(support, [&](const SupportObservation& observation) -> Json {
-    return ObservationJson(observation, {{"multiplier", observation.multiplier},
-                                         {"error_px", observation.error_px}});
-  });
+Json SweepJson(const Sweep& sweep) {
+  return KROT_JSON_OF(sweep, cost, seconds);
 }
 
-Json FoldsJson(const std::vector<FoldObservation>& folds) {
-  return ListJson(folds, [&](const FoldObservation& observation) -> Json {
-    return {{"image_id", observation.image_id},
-            {"image_name", observation.image_name},
-            {"point2D_idx", observation.point2D_idx},
-            {"camera_id", observation.camera_id}};
-  });
+Json SupportObservationJson(const SupportObservation& observation) {
+  return ObservationJson(observation,
+                         KROT_JSON_OF(observation, multiplier, error_px));
 }
 
-Json FactorJson(const std::optional<PositionFactor>& factor) {
-  if (!factor) return nullptr;
-  return {{"value", factor->factor},
-          {"lower_bound", factor->lower_bound},
-          {"max_error", factor->max_error}};
+Json FoldJson(const FoldObservation& fold) {
+  return KROT_JSON_OF(fold, image_id, image_name, point2D_idx, camera_id);
 }
 
-Json PositionsJson(const std::vector<SupportPosition>& positions) {
-  return ListJson(positions, [&](const SupportPosition& position) -> Json {
-    Json entry = position.image_name.empty()
-                     ? Json({{"point3D_id", position.point3D_id}})
-                     : Json({{"image_id", position.image_id},
-                             {"image_name", position.image_name}});
-    entry.update({{"share", position.share},
-                  {"distance", position.distance},
-                  {"radius", position.radius}});
-    return entry;
-  });
+Json FactorJson(const PositionFactor& factor) {
+  return Joined({{"value", factor.factor}},
+                KROT_JSON_OF(factor, lower_bound, max_error));
 }
 
-Json PolishJson(const std::optional<PolishSummary>& polish) {
-  if (!polish) return {};
-  const BundleAdjustmentSummary& adjustment = polish->adjustment;
-  return {{"polish", PolishName(polish->polish)},
-          {"termination", AdjustmentTerminationName(adjustment.termination)},
-          {"cost_initial", adjustment.cost_initial},
-          {"cost_final", adjustment.cost_final},
-          {"num_iterations", adjustment.num_iterations},
-          {"pixel_error", ErrorJson(polish->pixel_error)},
-          {"seconds", adjustment.seconds}};
+Json PositionJson(const SupportPosition& position) {
+  return Joined(position.image_name.empty()
+                    ? KROT_JSON_OF(position, point3D_id)
+                    : KROT_JSON_OF(position, image_id, image_name),
+                KROT_JSON_OF(position, share, distance, radius));
+}
+
+Json PolishJson(const PolishSummary& polish) {
+  const BundleAdjustmentSummary& adjustment = polish.adjustment;
+  Json json = {
+      {"polish", PolishName(polish.polish)},
+      {"termination", AdjustmentTerminationName(adjustment.termination)}};
+  json.update(
+      KROT_JSON_OF(adjustment, cost_initial, cost_final, num_iterations));
+  json["pixel_error"] = ErrorJson(polish.pixel_error);
+  json["seconds"] = adjustment.seconds;
+  return json;
 }
 
 const char* FinishTerminationName(InteriorPointTermination termination) {
@@ -219,117 +196,90 @@ const char* FinishTerminationName(InteriorPointTermination termination) {
                       termination);
 }
 
-Json FinishJson(const std::optional<FinishSummary>& finish) {
-  if (!finish) return {};
-  const BoundedSummary& solve = finish->solve;
-  return {{"finish", FinishName(Finish::kLeastSquares)},
-          {"loss", LossName(finish->loss.kind)},
-          {"termination", FinishTerminationName(solve.termination)},
-          {"cap", finish->cap},
-          {"lowest_cost", finish->lowest_cost},
-          {"cost_initial", solve.cost_initial},
-          {"cost_final", solve.cost_final},
-          {"duality_gap", NumberOrNull(solve.duality_gap)},
-          {"stationarity", NumberOrNull(solve.stationarity)},
-          {"num_active", solve.num_active},
-          {"num_iterations", solve.iterations},
-          {"seconds", finish->seconds}};
+Json FinishJson(const FinishSummary& finish) {
+  const BoundedSummary& solve = finish.solve;
+  Json json = {{"finish", FinishName(Finish::kLeastSquares)},
+               {"loss", LossName(finish.loss.kind)},
+               {"termination", FinishTerminationName(solve.termination)}};
+  json.update(KROT_JSON_OF(finish, cap, lowest_cost));
+  json.update(KROT_JSON_OF(solve, cost_initial, cost_final, duality_gap,
+                           stationarity, num_active));
+  json["num_iterations"] = solve.iterations;
+  json["seconds"] = finish.seconds;
+  return json;
 }
 
-Json OutliersJson(const std::optional<OutlierFilterSummary>& outliers) {
-  if (!outliers) return {};
-  return {{"max_error", outliers->max_error},
-          {"is_within", outliers->is_within},
-          {"num_observations", outliers->num_observations},
-          {"num_points", outliers->num_points},
-          {"num_removed", outliers->removed.size()},
-          {"num_left_alone", outliers->num_left_alone},
-          {"num_points_removed", outliers->num_points_removed},
-          {"num_must_go",
-           outliers->conflicts ? Json(outliers->num_proved) : Json()},
-          {"is_search_complete", outliers->is_search_complete},
-          {"weak_parts", WeakPartsJson(*outliers)},
-          {"seconds",
-           {{"removal", outliers->seconds_removal},
-            {"conflicts", outliers->seconds_conflicts},
-            {"solve", outliers->seconds_solve}}}};
+Json OutliersJson(const OutlierFilterSummary& outliers) {
+  return Joined(
+      Joined({{"max_error", outliers.max_error}}, OutlierCountsJson(outliers)),
+      {{"is_search_complete", outliers.is_search_complete},
+       {"weak_parts", WeakPartsJson(outliers)},
+       {"seconds",
+        {{"removal", outliers.seconds_removal},
+         {"conflicts", outliers.seconds_conflicts},
+         {"solve", outliers.seconds_solve}}}});
 }
 
 }  // namespace
 
 std::string SolveJson(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
-  const Json left_out = LeftOutJson(LeftOutByReason(summary));
-  Json sweeps = ListJson(summary.sweeps, [&](const Sweep& sweep) -> Json {
-    return {{"cost", sweep.cost}, {"seconds", sweep.seconds}};
-  });
   std::optional<double> linear_cost, linear_lower_bound;  // of the last round
   if (!summary.rounds.empty()) {
     linear_cost = summary.rounds.back().linear_cost;
     linear_lower_bound = summary.rounds.back().linear_lower_bound;
   }
-  const Json json = {
-      {"version", report.run.version},
-      {"command", report.command},
-      {"method", report.method},
-      {"norm", NormName(summary.norm)},
-      {"termination", TerminationName(summary.termination)},
-      {"num_frames", summary.num_frames},
-      {"num_images", summary.num_images},
-      {"num_points", summary.num_points},
-      {"num_observations", summary.num_observations},
-      {"working_observations", NumberOrNull(summary.num_working_observations)},
-      {"left_out", left_out},
-      {"same_image",
-       {{"num_tracks", summary.num_same_image_tracks},
-        {"support_point3D_ids", SameImageInSupport(summary)},
-        {"largest_left_out", NumberOrNull(LargestTwin(summary))}}},
-      {"outliers", OutliersJson(report.outliers)},
-      {"matches", report.matches ? MatchesJson(*report.matches) : Json()},
-      {"rotations", RotationsJson(report.run.rotations)},
-      {"fixed",
-       {{"num_frames", summary.num_fixed_frames},
-        {"num_points", summary.num_fixed_points}}},
-      {"positions",
-       {{"num_known", summary.num_positions},
-        {"largest_ratio", summary.largest_position_ratio},
-        {"frame",
-         PositionFrameJson(report.position_frame, report.is_in_position_frame)},
-        {"factor", FactorJson(summary.position_factor)}}},
-      {"distances", DistancesJson(report.distances, {"before", "after"})},
-      {"not_held", NotHeldJson(summary.loose)},
-      {"cost_initial", summary.cost_initial},
-      {"cost_final", summary.cost_final},
-      {"lower_bound", NumberOrNull(summary.lower_bound)},
-      {"relative_gap", NumberOrNull(summary.relative_gap)},
-      {"linear_cost", NumberOrNull(linear_cost)},
-      {"linear_lower_bound", NumberOrNull(linear_lower_bound)},
-      {"linear_relative_gap", NumberOrNull(LinearRelativeGap(summary))},
-      {"certified", summary.is_certified},
-      {"is_given_back", summary.is_given_back},
-      {"verdict", VerdictSentence(summary)},
-      {"collapse",
-       {{"in_camera", summary.collapse.in_camera},
-        {"at_infinity", summary.collapse.at_infinity},
-        {"is_in_one_place", summary.collapse.is_in_one_place}}},
-      {"is_underdetermined", summary.is_underdetermined},
-      {"pixel_error",
-       {{"before", ErrorJson(summary.pixel_error_before)},
-        {"after", ErrorJson(summary.pixel_error_after)}}},
-      {"finish", FinishJson(summary.finish)},
-      {"polish", PolishJson(summary.polish)},
-      {"rounds", RoundsJson(summary.rounds)},
-      {"sweeps", sweeps},
-      {"iterations", JointIterationsJson(summary.iterations)},
-      {"support", SupportJson(summary.support)},
-      {"support_positions", PositionsJson(summary.support_positions)},
-      {"at_folds", FoldsJson(summary.at_folds)},
-      {"announced_memory_bytes", summary.needed_bytes},
-  };
+  Json json = {{"version", report.run.version},
+               {"command", report.command},
+               {"method", report.method},
+               {"norm", NormName(summary.norm)},
+               {"termination", TerminationName(summary.termination)}};
+  json.update(KROT_JSON_OF(summary, num_frames, num_images, num_points,
+                           num_observations));
+  json["working_observations"] = summary.num_working_observations;
+  json["left_out"] = LeftOutJson(LeftOutByReason(summary));
+  json["same_image"] = {{"num_tracks", summary.num_same_image_tracks},
+                        {"support_point3D_ids", SameImageInSupport(summary)},
+                        {"largest_left_out", LargestTwin(summary)}};
+  json["outliers"] = JsonIf(report.outliers, OutliersJson);
+  json["matches"] = JsonIf(report.matches, MatchesJson);
+  json["rotations"] = JsonIf(report.run.rotations, RotationsJson);
+  json["fixed"] = {{"num_frames", summary.num_fixed_frames},
+                   {"num_points", summary.num_fixed_points}};
+  json["positions"] = {
+      {"num_known", summary.num_positions},
+      {"largest_ratio", summary.largest_position_ratio},
+      {"frame",
+       PositionFrameJson(report.position_frame, report.is_in_position_frame)},
+      {"factor", JsonIf(summary.position_factor, FactorJson)}};
+  json["distances"] = DistancesJson(report.distances, {"before", "after"});
+  json["not_held"] = NotHeldJson(summary.loose);
+  json.update(KROT_JSON_OF(summary, cost_initial, cost_final, lower_bound,
+                           relative_gap));
+  json["linear_cost"] = linear_cost;
+  json["linear_lower_bound"] = linear_lower_bound;
+  json["linear_relative_gap"] = LinearRelativeGap(summary);
+  json["certified"] = summary.is_certified;
+  json["is_given_back"] = summary.is_given_back;
+  json["verdict"] = VerdictSentence(summary);
+  json["collapse"] =
+      KROT_JSON_OF(summary.collapse, in_camera, at_infinity, is_in_one_place);
+  json["is_underdetermined"] = summary.is_underdetermined;
+  json["pixel_error"] =
+      BeforeAfterJson(summary.pixel_error_before, summary.pixel_error_after);
+  json["finish"] = JsonIf(summary.finish, FinishJson);
+  json["polish"] = JsonIf(summary.polish, PolishJson);
+  json["rounds"] = ListJson(summary.rounds, RoundJson);
+  json["sweeps"] = ListJson(summary.sweeps, SweepJson);
+  json["iterations"] = ListJson(summary.iterations, JointIterationJson);
+  json["support"] = ListJson(summary.support, SupportObservationJson);
+  json["support_positions"] = ListJson(summary.support_positions, PositionJson);
+  json["at_folds"] = ListJson(summary.at_folds, FoldJson);
+  json["announced_memory_bytes"] = summary.needed_bytes;
   return ReportText(json, report.run,
                     {{"build", summary.seconds_build},
                      {"solve", summary.seconds_solve},
-                     {"certify", NumberOrNull(summary.seconds_certify)}});
+                     {"certify", summary.seconds_certify}});
 }
 
 }  // namespace krot::internal

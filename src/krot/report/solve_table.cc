@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "krot/problem/cost.h"
-#include "krot/report/pair_report.h"
 #include "krot/report/reports.h"
 #include "krot/report/sentences.h"
 #include "krot/report/text_table.h"
@@ -33,15 +32,14 @@ void AddCost(const SolveSummary& summary, TextTable* table) {
 // The errors before, after and, if there was such a step, after the polish,
 // with a sentence about that.
 std::string SolveErrorTable(const SolveSummary& summary) {
-  std::vector<std::string> head = {"", "before", "after"};
+  Row head = {"", "before", "after"};
   std::vector<PixelErrorStatistics> estimates = {summary.pixel_error_before,
                                                  summary.pixel_error_after};
   if (summary.polish) {
     head.push_back("polished");
     estimates.push_back(summary.polish->pixel_error);
   }
-  TextTable table;
-  table.AddRow(head);
+  TextTable table(head);
   AddErrorColumns(estimates, &table);
   AddCost(summary, &table);
   return table.ToString() + PolishSentence(summary);
@@ -55,12 +53,11 @@ std::string BoundWords(const SolveSummary& summary) {
   const bool has_fixed =
       summary.num_fixed_frames + summary.num_fixed_points > 0;
   const bool has_positions = summary.num_positions > 0;
-  const std::string given = std::string(has_fixed ? "what is fixed" : "") +
-                            (has_fixed && has_positions ? " and " : "") +
-                            (has_positions ? "these positions" : "");
-  return (given.empty() ? given : "with " + given + ", ") +
-         "no translations and points bring all errors below " +
-         FormatNumber(bound, 4) + " px";
+  const std::string given = TextIf(has_fixed, "what is fixed") +
+                            TextIf(has_fixed && has_positions, " and ") +
+                            TextIf(has_positions, "these positions");
+  return TextIf(!given.empty(), "with " + given + ", ") +
+         "no translations and points bring all errors below " + Pixels(bound);
 }
 
 // Of a gap: the lens that it is due to. Requires some.
@@ -72,8 +69,7 @@ std::string FoldWords(const SolveSummary& summary) {
          " lies nearer than the maximum to where the projection of camera " +
          std::to_string(first.camera_id) +
          " folds or ends, so that no proof can rest on it" +
-         (num_others == 0 ? std::string()
-                          : ", nor on " + Counted(num_others, "other")) +
+         TextIf(num_others > 0, ", nor on " + Counted(num_others, "other")) +
          ". Another camera model may suit it better.";
 }
 
@@ -97,19 +93,19 @@ std::string FinishSentence(const SolveSummary& summary) {
   if (!summary.finish) return "";
   const BoundedSummary& solve = summary.finish->solve;
   const auto rms = [&](double cost) {
-    return FormatNumber(
-        std::sqrt(2 * cost / static_cast<double>(summary.num_observations)), 4);
+    return Pixels(
+        std::sqrt(2 * cost / static_cast<double>(summary.num_observations)));
   };
   const bool is_plain = summary.finish->loss.kind == ErrorLoss::Kind::kTrivial;
   return std::string(" Within that, ") +
          (is_plain ? "the least squares: RMS "
                    : "the least robust loss: root mean ") +
-         rms(solve.cost_final) + " px after " +
+         rms(solve.cost_final) + " after " +
          Counted(solve.iterations, "iteration") +
          (summary.termination == SolveTermination::kWithinBound
               ? ", where the start had "
               : ", where the lowest maximum alone left ") +
-         rms(solve.cost_initial) + " px" +
+         rms(solve.cost_initial) +
          (solve.termination == InteriorPointTermination::kConverged
               ? "."
               : "; a little less might be possible.");
@@ -139,14 +135,12 @@ std::string StepsWords(const SolveSummary& summary) {
   const int64_t num_joint =
       static_cast<int64_t>(summary.iterations.size()) - num_starting;
   const int64_t num_rounds = static_cast<int64_t>(summary.rounds.size());
-  const std::string before =
-      (num_rounds > 1 ? Counted(num_rounds, "round") + ", " : "") +
-      (num_starting > 0 ? Counted(num_starting, "iteration") + " to a start, "
-                        : "");
-  if (summary.method == SolveMethod::kResInt) {
-    return " after " + before + sweeps;
-  }
-  return " after " + before + Counted(num_joint, "joint iteration") +
+  const std::string after =
+      " after " + TextIf(num_rounds > 1, Counted(num_rounds, "round") + ", ") +
+      TextIf(num_starting > 0,
+             Counted(num_starting, "iteration") + " to a start, ");
+  if (summary.method == SolveMethod::kResInt) return after + sweeps;
+  return after + Counted(num_joint, "joint iteration") +
          WorkingSetWords(summary) + " and " + sweeps;
 }
 
@@ -172,9 +166,7 @@ std::string SolveEndSentence(const SolveSummary& summary) {
       return "Ended" + after + " with nothing left to lower.";
     case SolveTermination::kWithinBound:
       return "Every error is within the bound" +
-             (summary.finish
-                  ? " of " + FormatNumber(summary.finish->cap, 4) + " px"
-                  : std::string()) +
+             (summary.finish ? " of " + Pixels(summary.finish->cap) : "") +
              ". The lowest maximum was not looked for; --certificate_path does "
              "that.";
     case SolveTermination::kCollapsed:
@@ -196,10 +188,10 @@ std::string SolveEndSentence(const SolveSummary& summary) {
 std::string SolveCountsSentence(const SolveSummary& summary) {
   return CountsWords(summary) + " in the optimisation; " +
          LeftOutWords(LeftOutByReason(summary)) +
-         (summary.num_retriangulated_points > 0
-              ? "; " + Counted(summary.num_retriangulated_points, "point") +
-                    " re-triangulated at the start."
-              : ".");
+         TextIf(summary.num_retriangulated_points > 0,
+                "; " + Counted(summary.num_retriangulated_points, "point") +
+                    " re-triangulated at the start") +
+         ".";
 }
 
 // If a track sees an image more than once, at least one of these observations
@@ -212,23 +204,20 @@ std::string SameImageSentence(const SolveSummary& summary) {
   const int64_t num_twins =
       summary.left_out[static_cast<size_t>(LeftOut::kSameImage)];
   if (num_twins > 0) {
-    return tracks + "; " + Counted(num_twins, "observation") + " that " +
-           (num_twins == 1 ? "is" : "are") +
-           " not the closest of the image and track " +
-           (num_twins == 1 ? "is" : "are") +
+    const std::string are = num_twins == 1 ? "is" : "are";
+    return tracks + "; " + Counted(num_twins, "observation") + " that " + are +
+           " not the closest of the image and track " + are +
            " taken to be wrong: left out, still in the model, and in no error "
            "above (" +
            (std::isfinite(summary.largest_twin_error)
-                ? "the largest has " +
-                      FormatNumber(summary.largest_twin_error, 4) + " px"
-                : std::string("some do not project")) +
+                ? "the largest has " + Pixels(summary.largest_twin_error)
+                : "some do not project") +
            ").\n";
   }
   const std::vector<Point3DId> points = SameImageInSupport(summary);
   return tracks +
-         (points.empty()
-              ? std::string()
-              : "; in the support: " + PointList(points) +
+         TextIf(!points.empty(),
+                "; in the support: " + PointList(points) +
                     " (--Problem.same_image closest leaves one of each)") +
          ".\n";
 }
@@ -251,16 +240,16 @@ std::string PositionsKeptSentence(const SolveSummary& summary) {
 std::string PositionFactorSentence(const SolveSummary& summary) {
   if (!summary.position_factor) return "";
   const PositionFactor& factor = *summary.position_factor;
-  const std::string pixels = FormatNumber(factor.max_error, 4) + " px";
+  const std::string pixels = Pixels(factor.max_error);
   if (factor.factor == 1) {
     return "The largest error can be at most " + pixels +
            " with the radii as they are.\n";
   }
   return "All radii are multiplied by " + FormatNumber(factor.factor, 4) +
          ", so that the largest error can be at most " + pixels +
-         (factor.certificate ? "; with " + FormatNumber(factor.lower_bound, 4) +
-                                   " it is proved to be above"
-                             : std::string()) +
+         TextIf(factor.certificate.has_value(),
+                "; with " + FormatNumber(factor.lower_bound, 4) +
+                    " it is proved to be above") +
          ".\n";
 }
 
@@ -268,12 +257,11 @@ std::string PositionFactorSentence(const SolveSummary& summary) {
 std::string BracketOf(const SolveReport& report) {
   if (!report.outliers) return "";
   const OutlierFilterSummary& outliers = *report.outliers;
-  return "Within " + FormatNumber(outliers.max_error, 4) +
-         " px: " + BracketSentence(outliers) +
-         (outliers.num_points_removed > 0
-              ? "; with them went " +
-                    Counted(outliers.num_points_removed, "track")
-              : std::string()) +
+  return "Within " + Pixels(outliers.max_error) + ": " +
+         BracketSentence(outliers) +
+         TextIf(outliers.num_points_removed > 0,
+                "; with them went " +
+                    Counted(outliers.num_points_removed, "track")) +
          ".\n";
 }
 
@@ -284,22 +272,20 @@ std::string VerdictSentence(const SolveSummary& summary) {
     return GivenBackSentence(summary) +
            (summary.is_certified
                 ? " It is proved that " + BoundWords(summary) + "."
-                : std::string());
+                : "");
   }
   if (IsZeroUpToRounding(summary.cost_final)) {
     return "Every error is zero up to rounding (" +
            Scientific(summary.cost_final) + " px at most)" +
-           (summary.is_underdetermined
-                ? ", which says nothing: " + UnderdeterminedWords(summary)
-                : std::string()) +
+           TextIf(summary.is_underdetermined,
+                  ", which says nothing: " + UnderdeterminedWords(summary)) +
            ".";
   }
   const std::string maximum =
-      "Maximum " + FormatNumber(summary.cost_final, 4) + " px" +
-      (summary.norm.p == 2 ? "" : " (p = " + NormName(summary.norm) + ")") +
-      (summary.norm.p != 2 || CostIsMaximum(summary)
-           ? ""
-           : " over the observations in the optimisation");
+      "Maximum " + Pixels(summary.cost_final) +
+      TextIf(summary.norm.p != 2, " (p = " + NormName(summary.norm) + ")") +
+      TextIf(summary.norm.p == 2 && !CostIsMaximum(summary),
+             " over the observations in the optimisation");
   if (!summary.is_certified) {
     return maximum +
            (summary.termination == SolveTermination::kWithinBound
@@ -332,7 +318,7 @@ std::string SolveTable(const SolveReport& report) {
   text << LooseSentences(summary.loose, summary.num_images)
        << (report.position_frame
                ? PositionFrameSentence(*report.position_frame) + ".\n"
-               : std::string())
+               : "")
        << PositionFactorSentence(summary) << PositionsKeptSentence(summary)
        << SolveEndSentence(summary) << '\n'
        << VerdictSentence(summary) << '\n';
@@ -344,10 +330,9 @@ std::string SolveTable(const SolveReport& report) {
     text << DistanceTable(*report.distances, {"before", "after"});
   }
   text << (summary.is_certified || report.distances ? "\n" : "")
-       << RunSentence(report.run,
-                      "built " + FormatNumber(summary.seconds_build, 2) +
-                          " s, solved " +
-                          FormatNumber(summary.seconds_solve, 2) + " s");
+       << RunSentence(report.run, "built " + Seconds(summary.seconds_build) +
+                                      ", solved " +
+                                      Seconds(summary.seconds_solve));
   return text.str();
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
-#include <limits>
 #include <sstream>
 #include <vector>
 
@@ -31,20 +30,12 @@ int DecimalsFor(const std::vector<ToleranceBox>& boxes) {
                     12);
 }
 
-std::string EndText(const BoxEnd& end, int decimals) {
-  return end.proved ? FormatNumber(*end.proved, decimals) : "-";
-}
-
 // The length of the box's longest side; infinite if an end is not proved.
 double Width(const ToleranceBox& box) {
   double width = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    const BoxEnd& low = box.box.low[axis];
-    const BoxEnd& high = box.box.high[axis];
-    if (!low.proved || !high.proved) {
-      return std::numeric_limits<double>::infinity();
-    }
-    width = std::max(width, *high.proved - *low.proved);
+    width = std::max(width, box.box.high[axis].proved.value_or(kInfinity) -
+                                box.box.low[axis].proved.value_or(-kInfinity));
   }
   return width;
 }
@@ -81,13 +72,10 @@ std::string GaugeSentence(const ToleranceSummary& summary) {
 }
 
 Json EndsJson(const std::array<BoxEnd, 3>& ends) {
-  Json proved = Json::array();
-  Json reached = Json::array();
-  for (const BoxEnd& end : ends) {
-    proved.push_back(NumberOrNull(end.proved));
-    reached.push_back(end.reached);
-  }
-  return {{"proved", std::move(proved)}, {"reached", std::move(reached)}};
+  return {
+      {"proved", ListJson(ends, [](const BoxEnd& end) { return end.proved; })},
+      {"reached",
+       ListJson(ends, [](const BoxEnd& end) { return end.reached; })}};
 }
 
 Json BoxesJson(const std::vector<ToleranceBox>& boxes) {
@@ -103,22 +91,17 @@ Json BoxesJson(const std::vector<ToleranceBox>& boxes) {
   });
 }
 
-Json EndJson(const BoxEnd& end) {
-  return {{"proved", NumberOrNull(end.proved)}, {"reached", end.reached}};
-}
+Json EndJson(const BoxEnd& end) { return KROT_JSON_OF(end, proved, reached); }
 
-Json LengthsJson(const std::vector<ToleranceLength>& lengths) {
-  return ListJson(lengths, [&](const ToleranceLength& length) -> Json {
-    return {{"name", length.name},
-            {"metres", NumberOrNull(length.metres)},
-            {"tolerance", length.metres ? Json(length.tolerance) : Json()},
-            {"is_bar", length.is_bar},
-            {"length", FiniteOrNull(length.length)},
-            {"is_free", length.is_free},
-            {"low", EndJson(length.low)},
-            {"high", EndJson(length.high)},
-            {"is_contradicted", length.IsContradicted()}};
-  });
+Json LengthJson(const ToleranceLength& length) {
+  Json json = KROT_JSON_OF(length, name, metres);
+  json.update(
+      KnownIf(length.metres.has_value(), KROT_JSON_OF(length, tolerance)));
+  json.update(KROT_JSON_OF(length, is_bar, length, is_free));
+  json["low"] = EndJson(length.low);
+  json["high"] = EndJson(length.high);
+  json["is_contradicted"] = length.IsContradicted();
+  return json;
 }
 
 // Six significant digits. A proved end is rounded in the direction `outwards`
@@ -144,12 +127,12 @@ std::string LengthTable(const ToleranceSummary& summary) {
                    [](const ToleranceLength& length) { return length.is_bar; });
   const bool is_metric = bar != lengths.end();
   std::string text =
-      "\nWhat all estimates within " + FormatNumber(summary.max_error, 4) +
-      " px, with these rotations, allow distances to be, " +
+      "\nWhat all estimates within " + Pixels(summary.max_error) +
+      ", with these rotations, allow distances to be, " +
       (is_metric ? "metres by " + bar->name : std::string("scene units")) +
       "\n";
-  TextTable table;
-  table.AddRow({"", "at least", "at most", "in the model", "known", "within"});
+  TextTable table(
+      {"", "at least", "at most", "in the model", "known", "within"});
   std::string contradictions;
   bool has_free = false;
   for (const ToleranceLength& length : lengths) {
@@ -165,10 +148,10 @@ std::string LengthTable(const ToleranceSummary& summary) {
                       " is what is known of it.\n";
   }
   return text + table.ToString() + contradictions +
-         (has_free ? "Where there is no end, -, none was proved: most likely "
-                     "nothing holds the distance"
-                   : "") +
-         (has_free ? (is_metric ? ", or the scale bar.\n" : ".\n") : "");
+         TextIf(has_free,
+                "Where there is no end, -, none was proved: most likely "
+                "nothing holds the distance" +
+                    TextIf(is_metric, ", or the scale bar") + ".\n");
 }
 
 }  // namespace
@@ -178,29 +161,27 @@ std::string ToleranceTable(const ToleranceReport& report, int max_rows) {
   const std::string end =
       "\n" +
       RunSentence(report.run,
-                  "analyzed " + FormatNumber(summary.seconds, 2) + " s (" +
+                  "analyzed " + Seconds(summary.seconds) + " (" +
                       Counted(summary.num_programmes, "cone programme") + ")");
   if (summary.boxes.empty()) return LengthTable(summary) + end;
   const std::vector<ToleranceBox> listed =
       Listed(summary.boxes, static_cast<size_t>(max_rows));
   const int decimals = DecimalsFor(listed);
   std::string text =
-      "What all estimates within " + FormatNumber(summary.max_error, 4) +
-      " px have in common; rotations and intrinsics as given.\n" +
+      "What all estimates within " + Pixels(summary.max_error) +
+      " have in common; rotations and intrinsics as given.\n" +
       GaugeSentence(summary) + "\nNo such estimate lies outside (proved)" +
-      (listed.size() < summary.boxes.size()
-           ? "; the " + std::to_string(listed.size()) + " widest of " +
-                 std::to_string(summary.boxes.size()) + ", --csv_path has all"
-           : std::string()) +
+      TextIf(listed.size() < summary.boxes.size(),
+             "; the " + std::to_string(listed.size()) + " widest of " +
+                 std::to_string(summary.boxes.size()) +
+                 ", --csv_path has all") +
       "\n";
-  TextTable table;
-  table.AddRow({"", "x from", "to", "y from", "to", "z from", "to"});
+  TextTable table({"", "x from", "to", "y from", "to", "z from", "to"});
   for (const ToleranceBox& box : listed) {
-    std::vector<std::string> row = {
-        box.is_image ? box.name : "point " + std::to_string(box.id)};
+    Row row = {box.is_image ? box.name : "point " + std::to_string(box.id)};
     for (int axis = 0; axis < 3; ++axis) {
-      row.push_back(EndText(box.box.low[axis], decimals));
-      row.push_back(EndText(box.box.high[axis], decimals));
+      row.push_back(FormatNumber(box.box.low[axis].proved, decimals));
+      row.push_back(FormatNumber(box.box.high[axis].proved, decimals));
     }
     table.AddRow(std::move(row));
   }
@@ -220,45 +201,32 @@ std::string ToleranceTable(const ToleranceReport& report, int max_rows) {
 
 std::string ToleranceJson(const ToleranceReport& report) {
   const ToleranceSummary& summary = report.summary;
-  const Json json = {
-      {"version", report.run.version},
-      {"command", "tolerance_analyzer"},
-      {"norm", NormName(summary.norm)},
-      {"max_error", summary.max_error},
-      {"termination", ToleranceTerminationName(summary.termination)},
-      {"largest_error", summary.cost},
-      {"is_solved", summary.is_solved},
-      {"lower_bound", NumberOrNull(summary.lower_bound)},
-      {"gauge",
-       {{"images", summary.gauge_images},
-        {"num_fixed_frames", summary.num_fixed_frames},
-        {"num_fixed_points", summary.num_fixed_points}}},
-      {"num_frames", summary.num_frames},
-      {"num_points", summary.num_points},
-      {"num_observations", summary.num_observations},
-      {"num_without_region", summary.num_rowless},
-      {"num_far_points", summary.num_far_points},
-      {"num_programmes", summary.num_programmes},
-      {"contradictions", ContradictionsJson(report.run.contradictions)},
-      {"poses", PosesJson(report.run.poses)},
-      {"rotations", RotationsJson(report.run.rotations)},
-      {"pixel_error",
-       {{"before", ErrorJson(report.pixel_error_before)},
-        {"after", ErrorJson(report.pixel_error_after)}}},
-      {"boxes", BoxesJson(summary.boxes)},
-      {"lengths", LengthsJson(summary.lengths)},
-      {"agreement",
-       {{"num_ends", summary.agreement.num_ends},
-        {"num_proved", summary.agreement.num_proved},
-        {"worst", summary.agreement.worst}}},
-      {"seconds",
-       {{"read", report.run.seconds_read},
-        {"analysis", summary.seconds},
-        {"total", report.run.seconds_total}}},
-      {"peak_memory_bytes", report.run.peak_memory_bytes},
-      {"threads", report.run.threads},
-      {"seed", report.run.seed},
-  };
+  Json json = {{"version", report.run.version},
+               {"command", "tolerance_analyzer"},
+               {"norm", NormName(summary.norm)},
+               {"max_error", summary.max_error},
+               {"termination", ToleranceTerminationName(summary.termination)},
+               {"largest_error", summary.cost}};
+  json.update(KROT_JSON_OF(summary, is_solved, lower_bound));
+  json["gauge"] =
+      Joined({{"images", summary.gauge_images}},
+             KROT_JSON_OF(summary, num_fixed_frames, num_fixed_points));
+  json.update(KROT_JSON_OF(summary, num_frames, num_points, num_observations));
+  json["num_without_region"] = summary.num_rowless;
+  json.update(KROT_JSON_OF(summary, num_far_points, num_programmes));
+  json["contradictions"] = ContradictionsJson(report.run.contradictions);
+  json["poses"] = PosesJson(report.run.poses);
+  json["rotations"] = JsonIf(report.run.rotations, RotationsJson);
+  json["pixel_error"] =
+      BeforeAfterJson(report.pixel_error_before, report.pixel_error_after);
+  json["boxes"] = BoxesJson(summary.boxes);
+  json["lengths"] = ListJson(summary.lengths, LengthJson);
+  json["agreement"] =
+      KROT_JSON_OF(summary.agreement, num_ends, num_proved, worst);
+  json["seconds"] = {{"read", report.run.seconds_read},
+                     {"analysis", summary.seconds},
+                     {"total", report.run.seconds_total}};
+  json.update(KROT_JSON_OF(report.run, peak_memory_bytes, threads, seed));
   return ReportText(json);
 }
 
