@@ -21,7 +21,6 @@ using Eigen::Vector3d;
 PrecisionFigures::PrecisionFigures(const AdjustmentPrecision& precision,
                                    const Model& model)
     : precision_(precision) {
-  num_observations = static_cast<int64_t>(precision.observations.size());
   for (const PointPrecision& point : precision.points) {
     const Point3D& of = model.points3D[point.point];
     for (int n = 0; n < point.num_rays; ++n) {

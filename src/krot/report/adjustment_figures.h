@@ -54,7 +54,6 @@ struct PrecisionFigures {
   double MedianDetectablePx() const;
 
   std::vector<NamedObservation> all;
-  int64_t num_observations = 0;
   std::map<int, int64_t> num_with_rays;
   double mean_angle_deg = 0;
   int64_t num_tested = 0;

@@ -21,21 +21,17 @@ bool RepeatsAnImage(const Model& model, const Point3D& point) {
   return false;
 }
 
-NoiseFigures FiguresOf(const Model& model, const ModelNoise& noise) {
+NoiseFigures FindNoise(const Model& model) {
   NoiseFigures figures;
-  figures.sigma_px = noise.sigma_px;
-  figures.cauchy_scale_px = noise.cauchy_scale_px;
-  figures.critical_w = noise.critical_w;
-  figures.num_tested = noise.num_tested;
-  figures.num_above = noise.num_above;
+  static_cast<ModelNoise&>(figures) = EstimateNoise(model);
   figures.num_above_by_image.assign(model.images.size(), 0);
   const std::vector<int32_t> image_of = ImagesOfElements(model);
   for (size_t e = 0; e < image_of.size(); ++e) {
     figures.num_above_by_image[image_of[e]] +=
-        noise.observations[e].w > noise.critical_w;
+        figures.observations[e].w > figures.critical_w;
   }
   std::vector<double> w;
-  for (const ObservationNoise& one : noise.observations) {
+  for (const ObservationNoise& one : figures.observations) {
     figures.num_half_controlled += one.num_controlled == 1;
     figures.num_uncontrolled += one.num_controlled == 0;
     if (one.num_controlled > 0) w.push_back(one.w);
@@ -60,7 +56,7 @@ ModelReport AnalyzeModel(const Model& model, int num_worst) {
   report.images = ErrorsByImage(model, errors_px);
   report.cameras = ErrorsByCamera(model, errors_px);
   report.worst = WorstObservations(model, errors_px, num_worst);
-  report.noise = FiguresOf(model, EstimateNoise(model, {}, {}));
+  report.noise = FindNoise(model);
   report.track_lengths = TrackLengthHistogram(model);
   report.num_tracks_with_repeated_image = std::count_if(
       model.points3D.begin(), model.points3D.end(),

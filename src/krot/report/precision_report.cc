@@ -101,9 +101,8 @@ std::string SummarySection(const AdjustModelSummary& summary,
   };
   row("images", Thousands(summary.adjustment.num_images));
   row("object points", Thousands(summary.adjustment.num_points));
-  row("image points", Thousands(figures.num_observations));
-  row("observations (image coordinates)",
-      Thousands(2 * figures.num_observations));
+  row("image points", Thousands(figures.all.size()));
+  row("observations (image coordinates)", Thousands(2 * figures.all.size()));
   if (precision.num_positions > 0) {
     row("known positions", Thousands(precision.num_positions));
   }
@@ -124,9 +123,8 @@ std::string SummarySection(const AdjustModelSummary& summary,
     square += o.error_px * o.error_px;
   }
   row("RMS of image points, px",
-      FormatNumber(
-          std::sqrt(square / static_cast<double>(figures.num_observations)),
-          4));
+      FormatNumber(std::sqrt(square / static_cast<double>(figures.all.size())),
+                   4));
   row("largest residual, px", FormatNumber(worst.at(0).error_px, 4));
   return table.ToString() + "  largest residual: " + ResidualName(worst.at(0)) +
          "\n" + DatumSentence(precision) + "\n" + ValiditySentence(summary);
@@ -202,7 +200,7 @@ std::string ImageSection(const AdjustmentPrecision& precision,
 std::string ReliabilitySection(const AdjustmentPrecision& precision,
                                const PrecisionFigures& figures) {
   const double mean_r = static_cast<double>(precision.redundancy) /
-                        (2 * static_cast<double>(figures.num_observations));
+                        (2 * static_cast<double>(figures.all.size()));
   TextTable table;
   table.AddRow({"mean redundancy number", FormatNumber(mean_r, 3)});
   table.AddRow({"median smallest detectable error, px",

@@ -175,19 +175,14 @@ std::string ComparisonJson(const ComparisonReport& report);
 // centres, and its name.
 std::string PoseErrorsCsv(const ComparisonSummary& summary);
 
-// The figures of EstimateNoise; none where nothing is known.
-struct NoiseFigures {
+// What EstimateNoise finds, and more figures of it.
+struct NoiseFigures : ModelNoise {
   struct Quantile {
     double share = 0;  // of the tested observations, that have at most this w
     double w = 0;
     double gaussian_w = 0;  // the same quantile for Gaussian noise
   };
 
-  std::optional<double> sigma_px;
-  std::optional<double> cauchy_scale_px;
-  double critical_w = 0;
-  int64_t num_tested = 0;
-  int64_t num_above = 0;
   // Observations with one, or without any, controlled direction.
   int64_t num_half_controlled = 0;
   int64_t num_uncontrolled = 0;

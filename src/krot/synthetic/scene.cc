@@ -162,7 +162,7 @@ Model MakeSkeleton(const SceneOptions& options, const SceneGeometry& geometry) {
     for (int s = 0; s < num_sensors; ++s) {
       Image image;
       image.id = ImageIdOf(f, s, num_sensors);
-      image.camera_id = model.cameras[static_cast<size_t>(s)].id;
+      image.camera_id = model.cameras[s].id;
       image.name = ImageName(f, s, num_sensors);
       model.images.push_back(std::move(image));
     }

@@ -14,8 +14,7 @@ namespace {
 std::optional<Eigen::Vector2d> OnImagePlane(const Camera& camera,
                                             const Eigen::Vector2d& pixel) {
   const auto undistorted = UndistortPixel(camera, pixel);
-  if (!undistorted) return std::nullopt;
-  return undistorted->u;
+  return undistorted ? std::optional(undistorted->u) : std::nullopt;
 }
 
 // The largest ||u|| on the image's border, which bounds that of the interior.
@@ -59,25 +58,22 @@ Imaging::Imaging(const Camera& camera, double margin_px,
 
 std::optional<Eigen::Vector2d> Imaging::Project(
     int image, const Eigen::Vector3d& x_world) const {
-  const size_t j = static_cast<size_t>(image);
-  const Eigen::Vector3d x_cam = cam_from_world_[j] * x_world;
+  const Eigen::Vector3d x_cam = cam_from_world_[image] * x_world;
   const double depth = has_image_plane_ ? x_cam.z() : x_cam.norm();
   if (depth < 0.2) return std::nullopt;
   if (has_image_plane_ && x_cam.hnormalized().norm() > max_ray_radius_) {
     return std::nullopt;
   }
   const Eigen::Vector2d pixel = ProjectPoint(camera_, x_cam).value();
-  const bool inside = (pixel.array() >= lower_.array()).all() &&
-                      (pixel.array() <= upper_.array()).all();
-  if (!inside) return std::nullopt;
-  return pixel;
+  const bool is_inside = (pixel.array() >= lower_.array()).all() &&
+                         (pixel.array() <= upper_.array()).all();
+  return is_inside ? std::optional(pixel) : std::nullopt;
 }
 
 std::optional<Eigen::Vector3d> Imaging::PointAt(int image,
                                                 const Eigen::Vector2d& fraction,
                                                 double depth) const {
-  const size_t j = static_cast<size_t>(image);
-  const RigidTransform& pose = cam_from_world_[j];
+  const RigidTransform& pose = cam_from_world_[image];
   const Eigen::Vector2d pixel = lower_ + fraction.cwiseProduct(upper_ - lower_);
   std::optional<Eigen::Vector3d> ray;  // at depth 1
   if (has_image_plane_) {
@@ -158,9 +154,7 @@ class StructureSampler {
   // may be in any order before.
   int DrawOffset(size_t n) {
     const size_t rest = offsets_.size() - n;
-    const size_t pick =
-        n +
-        static_cast<size_t>(random_->UniformInt(static_cast<int64_t>(rest)));
+    const size_t pick = n + random_->UniformInt(static_cast<int64_t>(rest));
     std::swap(offsets_[n], offsets_[pick]);
     return offsets_[n];
   }

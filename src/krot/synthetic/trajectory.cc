@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "krot/base/numbers.h"
@@ -33,10 +32,7 @@ double Random::Gaussian() {
 }
 
 Eigen::Vector3d Random::GaussianVector() {
-  const double x = Gaussian();
-  const double y = Gaussian();
-  const double z = Gaussian();
-  return {x, y, z};
+  return {Gaussian(), Gaussian(), Gaussian()};  // from left to right
 }
 
 bool Random::Chance(double probability) { return Uniform() < probability; }
@@ -190,7 +186,7 @@ class ObservationWriter {
       point.track_begin = model_->track_elements.size();
       for (int64_t n = structure.point_begin[k];
            n < structure.point_begin[k + 1]; ++n) {
-        WriteSighting(structure.sightings[static_cast<size_t>(n)], point.id);
+        WriteSighting(structure.sightings[n], point.id);
       }
       point.track_end = model_->track_elements.size();
       model_->points3D.push_back(point);
@@ -208,15 +204,13 @@ class ObservationWriter {
   }
 
   Eigen::Vector2d RandomPixel() {
-    const double x = random_->Uniform(0, options_.image_width);
-    const double y = random_->Uniform(0, options_.image_height);
-    return {x, y};
+    return {random_->Uniform(0, options_.image_width),
+            random_->Uniform(0, options_.image_height)};
   }
 
   Eigen::Vector2d NoisyPixel(const Eigen::Vector2d& pixel) {
-    const double dx = options_.pixel_noise * random_->Gaussian();
-    const double dy = options_.pixel_noise * random_->Gaussian();
-    return pixel + Eigen::Vector2d(dx, dy);
+    return pixel + Eigen::Vector2d{options_.pixel_noise * random_->Gaussian(),
+                                   options_.pixel_noise * random_->Gaussian()};
   }
 
   void WriteSighting(const Sighting& sighting, Point3DId point_id) {
@@ -227,24 +221,22 @@ class ObservationWriter {
       WritePoint2D(sighting.image, NoisyPixel(sighting.pixel), point_id);
     }
     if (random_->Chance(options_.duplicate_ratio)) {
-      const double dx = random_->Uniform(-kTwinDistance, kTwinDistance);
-      const double dy = random_->Uniform(-kTwinDistance, kTwinDistance);
-      WritePoint2D(sighting.image,
-                   NoisyPixel(sighting.pixel) + Eigen::Vector2d(dx, dy),
+      const Eigen::Vector2d offset{
+          random_->Uniform(-kTwinDistance, kTwinDistance),
+          random_->Uniform(-kTwinDistance, kTwinDistance)};
+      WritePoint2D(sighting.image, NoisyPixel(sighting.pixel) + offset,
                    point_id);
     }
   }
 
   void WritePoint2D(int image_index, const Eigen::Vector2d& pixel,
                     Point3DId point_id) {
-    Image& image = model_->images[static_cast<size_t>(image_index)];
+    Image& image = model_->images[image_index];
     model_->track_elements.push_back(
         {image.id, static_cast<uint32_t>(image.points2D.size())});
-    Point2D point2D;
-    point2D.x = std::clamp<double>(pixel.x(), 0, options_.image_width);
-    point2D.y = std::clamp<double>(pixel.y(), 0, options_.image_height);
-    point2D.point3D_id = point_id;
-    image.points2D.push_back(point2D);
+    image.points2D.push_back(
+        {std::clamp<double>(pixel.x(), 0, options_.image_width),
+         std::clamp<double>(pixel.y(), 0, options_.image_height), point_id});
   }
 
   const SceneOptions options_;
@@ -298,11 +290,9 @@ struct SmallestDepths {
 SmallestDepths FindSmallestDepths(const SceneGeometry& geometry,
                                   const Structure& structure,
                                   bool has_image_plane) {
-  const double infinity = std::numeric_limits<double>::infinity();
   SmallestDepths smallest;
-  smallest.of_frame.assign(geometry.rig_from_world.size(), infinity);
-  smallest.of_point.assign(geometry.points.size(), infinity);
-
+  smallest.of_frame.assign(geometry.rig_from_world.size(), kInfinity);
+  smallest.of_point.assign(geometry.points.size(), kInfinity);
   std::vector<RigidTransform> cam_from_world;
   for (const Pose& pose : CamFromWorld(geometry)) {
     cam_from_world.push_back(pose.Transform());
@@ -311,8 +301,7 @@ SmallestDepths FindSmallestDepths(const SceneGeometry& geometry,
   for (size_t k = 0; k < geometry.points.size(); ++k) {
     for (int64_t n = structure.point_begin[k]; n < structure.point_begin[k + 1];
          ++n) {
-      const size_t image =
-          static_cast<size_t>(structure.sightings[size_t(n)].image);
+      const int32_t image = structure.sightings[n].image;
       const Eigen::Vector3d x_cam = cam_from_world[image] * geometry.points[k];
       const double depth = has_image_plane ? x_cam.z() : x_cam.norm();
       double& of_frame = smallest.of_frame[image / num_sensors];
