@@ -5,14 +5,12 @@
 #include <limits>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <Eigen/Eigenvalues>
 
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {
