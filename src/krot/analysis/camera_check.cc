@@ -10,8 +10,8 @@
 #include "krot/analysis/pose_rows.h"
 #include "krot/base/numbers.h"
 #include "krot/geometry/transform.h"
+#include "krot/linear/blocks.h"
 #include "krot/linear/reduced_camera_system.h"
-#include "krot/linear/small_matrices.h"
 
 namespace krot::internal {
 namespace {
