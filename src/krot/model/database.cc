@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "krot/base/numbers.h"
+#include "krot/model/model_io.h"
 #include "krot/model/sqlite_rows.h"
 
 namespace krot {
