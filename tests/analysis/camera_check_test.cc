@@ -11,7 +11,7 @@
 
 #include "krot/camera/camera_model.h"
 #include "krot/check.h"
-#include "krot/linear/small_matrices.h"
+#include "krot/linear/blocks.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"

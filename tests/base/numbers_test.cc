@@ -11,7 +11,6 @@
 
 #include "krot/base/check.h"
 #include "krot/base/context.h"
-#include "krot/base/disjoint_sets.h"
 #include "tests/testing/thread_ranks.h"
 
 namespace krot::internal {

@@ -134,25 +134,6 @@ TEST(MinimizeSlack, CannotBeLoweredByAnyNearbyEstimate) {
   }
 }
 
-TEST(MinimizeSlack, GivesObservationsWithinTheBoundNoPrice) {
-  const RandomScene scene = MakeSlackScene(3);
-  const double cost = Cost(scene.problem, scene.estimate, Norm::L2(), 1);
-  const double bound = 0.2 * cost;
-  Estimate estimate = scene.estimate;
-  const SlackSolution solution =
-      MinimizeSlack(scene.problem, bound, {}, {}, &estimate);
-  for (size_t i = 0; i < solution.price.size(); ++i) {
-    const double residual = ResidualOf(
-        ViewPoint(scene.problem, scene.problem.observations[i], estimate),
-        Norm::L2());
-    if (residual < 0.9 * bound) {
-      EXPECT_LT(solution.price[i], 1e-3);
-    } else if (residual > 1.1 * bound) {
-      EXPECT_GT(solution.price[i], 0.99);
-    }
-  }
-}
-
 TEST(MinimizeSlack, EndsWithTheGapAskedForHoweverFarApartTheWeightsAre) {
   for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
     const RandomScene scene = MakeSlackScene(6);

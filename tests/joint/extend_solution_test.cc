@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "krot/joint/joint.h"
-#include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 #include "tests/problem/random_problem.h"

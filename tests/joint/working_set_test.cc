@@ -1,4 +1,3 @@
-#include "krot/joint/working_set.h"
 
 #include <algorithm>
 #include <limits>
@@ -41,7 +40,8 @@ TEST(WorkingSet, TakesInTheWorstPointsAboveALevel) {
   const RandomScene scene = MakeScene();
   std::vector<double> costs;
   for (int32_t k = 0; k < scene.problem.num_points; ++k) {
-    costs.push_back(PointCost(scene.problem, scene.estimate, Norm::L2(), k));
+    costs.push_back(CostOf(scene.problem, scene.estimate, Norm::L2(),
+                           scene.problem.OfPoint(k)));
   }
   EXPECT_EQ(*std::max_element(costs.begin(), costs.end()),
             Cost(scene.problem, scene.estimate, Norm::L2(), 1));
@@ -83,7 +83,7 @@ TEST(WorkingSet, TakesOfAPointWhatIsNearTheLevelAndFourAtLeast) {
   EXPECT_LT(taken.size(), 5 * static_cast<size_t>(num_added));  // of six
   for (int32_t k = 0; k < problem.num_points; ++k) {
     const bool is_above =
-        PointCost(problem, scene.estimate, Norm::L2(), k) > level;
+        CostOf(problem, scene.estimate, Norm::L2(), problem.OfPoint(k)) > level;
     EXPECT_EQ(set.Contains(k), is_above);
     std::vector<double> errors;
     for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];

@@ -1,13 +1,12 @@
 #include "krot/convert/certificate_file.h"
 
 #include <functional>
-#include <numeric>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "krot/context.h"
-#include "krot/outliers/conflict.h"
+#include "krot/outliers/removal.h"
 #include "tests/outliers/outlier_scenes.h"
 #include "tests/testing/model_matchers.h"
 
@@ -25,19 +24,16 @@ Packed PackScene(bool has_own_bounds) {
   Packed result;
   result.model = MakeOutlierScene(1, 0.05).model;
   BuiltProblem built = BuildProblem(result.model, {});
-  std::vector<int64_t> all(built.pixels.size());
   if (has_own_bounds) {
     std::vector<double> scales;
-    for (size_t i = 0; i < all.size(); ++i) {
+    for (size_t i = 0; i < built.pixels.size(); ++i) {
       scales.push_back(i % 3 == 0 ? 1 : 0.7);
     }
     ScaleObservations(scales, &built);
   }
-  std::iota(all.begin(), all.end(), 0);
   std::vector<PixelCertificate> proofs;
-  Work work;
   for (const Conflict& conflict :
-       PackConflicts(result.model, built, {Norm::L2(), 2}, all, {}, &work)) {
+       DisjointConflicts(result.model, built, {Norm::L2(), 2})) {
     proofs.push_back(conflict.proof);
   }
   result.file = DescribeConflicts(result.model, built, Norm::L2(), 2, proofs);

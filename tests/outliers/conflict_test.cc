@@ -1,4 +1,4 @@
-#include "krot/outliers/conflict.h"
+#include "krot/outliers/removal.h"
 
 #include <algorithm>
 #include <numeric>
@@ -44,16 +44,15 @@ bool HasOracle() {
       .has_value();
 }
 
-TEST(PackConflicts, AreInfeasibleAndIrreducibleByAnIndependentOracle) {
+TEST(DisjointConflicts, AreInfeasibleAndIrreducibleByAnIndependentOracle) {
   if (!HasOracle()) GTEST_SKIP() << "built without CLP";
   for (const Norm norm : {Norm::LInf(), Norm::L1()}) {
     for (const uint64_t seed : {1u, 2u, 3u}) {
       SCOPED_TRACE(testing::Message() << "p = " << norm.p << ", " << seed);
       const SyntheticScene scene = MakeOutlierScene(seed, 0.03);
       const BuiltProblem built = BuildProblem(scene.model, {});
-      Work work;
-      const std::vector<Conflict> conflicts = PackConflicts(
-          scene.model, built, {norm, kConflictBound}, All(built), {}, &work);
+      const std::vector<Conflict> conflicts =
+          DisjointConflicts(scene.model, built, {norm, kConflictBound});
       ASSERT_FALSE(conflicts.empty());
       for (const Conflict& conflict : conflicts) {
         EXPECT_TRUE(conflict.is_irreducible);
@@ -79,7 +78,7 @@ std::vector<double> Scales(const BuiltProblem& built) {
   return scales;
 }
 
-TEST(PackConflicts, WithABoundForEachHoldByAnIndependentOracle) {
+TEST(DisjointConflicts, WithABoundForEachHoldByAnIndependentOracle) {
   if (!HasOracle()) GTEST_SKIP() << "built without CLP";
   const SyntheticScene scene = MakeOutlierScene(1, 0.12, 14, 0.3);
   BuiltProblem built = BuildProblem(scene.model, {});
@@ -89,10 +88,8 @@ TEST(PackConflicts, WithABoundForEachHoldByAnIndependentOracle) {
     by_hand.observations[i].E.bottomRows<2>() /= scales[i];
   }
   ScaleObservations(scales, &built);
-  Work work;
   const std::vector<Conflict> conflicts =
-      PackConflicts(scene.model, built, {Norm::LInf(), kConflictBound},
-                    All(built), {}, &work);
+      DisjointConflicts(scene.model, built, {Norm::LInf(), kConflictBound});
   ASSERT_GE(conflicts.size(), 2u);
   for (const Conflict& conflict : conflicts) {
     EXPECT_GT(OptimumByOracle(by_hand, Norm::LInf(), conflict.observations),
@@ -107,18 +104,16 @@ TEST(PackConflicts, WithABoundForEachHoldByAnIndependentOracle) {
   }
 }
 
-TEST(PackConflicts, AreThoseOfTwiceTheBoundWhereAllScalesAreAHalf) {
+TEST(DisjointConflicts, AreThoseOfTwiceTheBoundWhereAllScalesAreAHalf) {
   SceneOptions options = OutlierScene(5, 0.05, 60, 0.5);
   options.camera_model_id = 4;  // OPENCV
   const SyntheticScene scene = SynthesizeScene(options);
   BuiltProblem built = BuildProblem(scene.model, {});
-  Work work;
-  const std::vector<Conflict> plain = PackConflicts(
-      scene.model, built, {Norm::L2(), kConflictBound}, All(built), {}, &work);
+  const std::vector<Conflict> plain =
+      DisjointConflicts(scene.model, built, {Norm::L2(), kConflictBound});
   ScaleObservations(std::vector<double>(built.pixels.size(), 0.5), &built);
   const std::vector<Conflict> scaled =
-      PackConflicts(scene.model, built, {Norm::L2(), 2 * kConflictBound},
-                    All(built), {}, &work);
+      DisjointConflicts(scene.model, built, {Norm::L2(), 2 * kConflictBound});
   ASSERT_GT(plain.size(), 1u);
   ASSERT_EQ(scaled.size(), plain.size());
   for (size_t n = 0; n < plain.size(); ++n) {
@@ -128,14 +123,13 @@ TEST(PackConflicts, AreThoseOfTwiceTheBoundWhereAllScalesAreAHalf) {
   }
 }
 
-TEST(PackConflicts, HaveNoCommonObservationAndAnAcceptedProof) {
+TEST(DisjointConflicts, HaveNoCommonObservationAndAnAcceptedProof) {
   for (const uint64_t seed : {4u, 5u}) {
     const SyntheticScene scene = MakeOutlierScene(seed, 0.05);
     const BuiltProblem built = BuildProblem(scene.model, {});
     const ErrorBound bound{Norm::L2(), kConflictBound};
-    Work work;
     const std::vector<Conflict> conflicts =
-        PackConflicts(scene.model, built, bound, All(built), {}, &work);
+        DisjointConflicts(scene.model, built, bound);
     ASSERT_FALSE(conflicts.empty());
     std::set<int64_t> seen;
     for (const Conflict& conflict : conflicts) {
@@ -152,13 +146,10 @@ TEST(PackConflicts, HaveNoCommonObservationAndAnAcceptedProof) {
   }
 }
 
-TEST(PackConflicts, AreNoneWhereEverythingFits) {
+TEST(DisjointConflicts, AreNoneWhereEverythingFits) {
   const SyntheticScene scene = MakeOutlierScene(6, 0);
   const BuiltProblem built = BuildProblem(scene.model, {});
-  Work work;
-  EXPECT_TRUE(
-      PackConflicts(scene.model, built, {Norm::L2(), 4}, All(built), {}, &work)
-          .empty());
+  EXPECT_TRUE(DisjointConflicts(scene.model, built, {Norm::L2(), 4}).empty());
 }
 
 // A camera that maps everything to one pixel says nothing about its points.
@@ -175,27 +166,6 @@ TEST(Decide, EndsSoonWhereNothingCanBeDecided) {
   EXPECT_FALSE(decision.is_feasible);
   EXPECT_FALSE(decision.is_refuted);
   EXPECT_LE(work.done, 500 * static_cast<int64_t>(built.pixels.size()));
-}
-
-TEST(PackConflicts, EndWhereTheirWorkIsUsedUp) {
-  const SyntheticScene scene = MakeOutlierScene(4, 0.05);
-  const BuiltProblem built = BuildProblem(scene.model, {});
-  const ErrorBound bound{Norm::L2(), kConflictBound};
-  Work whole;
-  const std::vector<Conflict> all =
-      PackConflicts(scene.model, built, bound, All(built), {}, &whole);
-  ASSERT_GE(all.size(), 4u);
-  ASSERT_GT(whole.done, 0);
-  Work half;
-  half.limit = whole.done / 2;
-  const std::vector<Conflict> some =
-      PackConflicts(scene.model, built, bound, All(built), {}, &half);
-  EXPECT_TRUE(half.IsUsedUp());
-  ASSERT_FALSE(some.empty());
-  ASSERT_LT(some.size(), all.size());
-  for (size_t n = 0; n < some.size(); ++n) {
-    EXPECT_EQ(some[n].observations, all[n].observations);
-  }
 }
 
 TEST(FindConflict, OfAnImageTwiceInATrackIsThePair) {

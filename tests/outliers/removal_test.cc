@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "krot/convert/reprojection.h"
-#include "krot/outliers/conflict.h"
 #include "tests/outliers/outlier_scenes.h"
 #include "tests/problem/random_problem.h"
 

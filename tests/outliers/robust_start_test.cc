@@ -13,7 +13,6 @@
 #include "krot/analysis/model_comparison.h"
 #include "krot/model/rigs.h"
 #include "krot/outliers/outlier_filter.h"
-#include "krot/outliers/parts.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/scene_of.h"

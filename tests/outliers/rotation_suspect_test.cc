@@ -7,7 +7,6 @@
 
 #include "krot/convert/reprojection.h"
 #include "krot/model/rigs.h"
-#include "krot/outliers/conflict.h"
 #include "krot/outliers/removal.h"
 #include "tests/outliers/outlier_scenes.h"
 

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/convert/certificate_file.h"
-#include "krot/joint/working_set.h"
+#include "krot/joint/joint.h"
 #include "krot/linear/blocks.h"
 #include "krot/linear/ordered_sums.h"
 #include "krot/model/derived_models.h"

@@ -105,7 +105,7 @@ TEST(Cost, IsInfiniteIfOnePointIsBehindOneCamera) {
   EXPECT_EQ(Cost(scene.problem, scene.estimate, Norm::L2(), 1), kInfinity);
 }
 
-TEST(PointCost, IsTheLargestResidualOfThePoint) {
+TEST(CostOf, IsTheLargestResidualOfThePoint) {
   const RandomScene scene = MakeRandomScene({});
   double largest = 0;
   for (int32_t k = 0; k < scene.problem.num_points; ++k) {
@@ -117,7 +117,8 @@ TEST(PointCost, IsTheLargestResidualOfThePoint) {
           ResidualOf(ViewPoint(scene.problem, observation, scene.estimate),
                      Norm::L2()));
     }
-    EXPECT_EQ(PointCost(scene.problem, scene.estimate, Norm::L2(), k),
+    EXPECT_EQ(CostOf(scene.problem, scene.estimate, Norm::L2(),
+                     scene.problem.OfPoint(k)),
               expected);
     largest = std::max(largest, expected);
   }

@@ -259,14 +259,15 @@ TEST(BlockSweep, LeavesPointsAtTheLevelOfTheGoalWhereTheyAre) {
   BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(),
                     Context{1});
   const double level =
-      (1 + 1e-9) * PointCost(scene.problem, scene.estimate, Norm::L2(), 0);
+      (1 + 1e-9) * CostOf(scene.problem, scene.estimate, Norm::L2(),
+                          scene.problem.OfPoint(0));
   blocks.SetGoal({1e-11, level});
   Estimate estimate = scene.estimate;
   blocks.IntersectPoints(&estimate);
   int num_moved = 0;
   for (int32_t k = 0; k < scene.problem.num_points; ++k) {
-    const bool is_above =
-        PointCost(scene.problem, scene.estimate, Norm::L2(), k) > level;
+    const bool is_above = CostOf(scene.problem, scene.estimate, Norm::L2(),
+                                 scene.problem.OfPoint(k)) > level;
     EXPECT_EQ(estimate.points[k] != scene.estimate.points[k], is_above);
     num_moved += is_above;
   }

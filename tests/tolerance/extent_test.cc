@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "tests/oracle/lp_oracle.h"
 #include "tests/problem/random_problem.h"

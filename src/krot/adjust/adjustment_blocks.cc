@@ -9,7 +9,7 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/base/disjoint_sets.h"
+#include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/context.h"
 #include "krot/geometry.h"

@@ -6,7 +6,7 @@
 #include "krot/base/numbers.h"
 #include "krot/geometry.h"
 #include "krot/geometry/transform.h"
-#include "krot/linear/small_matrices.h"
+#include "krot/linear/blocks.h"
 
 namespace krot::internal {
 namespace {

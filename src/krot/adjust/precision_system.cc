@@ -1,7 +1,6 @@
 #include "krot/adjust/precision_system.h"
 
 #include "krot/linear/blocks.h"
-#include "krot/linear/small_matrices.h"
 
 namespace krot::internal {
 namespace {

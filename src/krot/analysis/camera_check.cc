@@ -9,8 +9,8 @@
 
 #include "krot/base/numbers.h"
 #include "krot/geometry/transform.h"
+#include "krot/linear/blocks.h"
 #include "krot/linear/reduced_camera_system.h"
-#include "krot/linear/small_matrices.h"
 
 namespace krot::internal {
 namespace {

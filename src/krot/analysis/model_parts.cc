@@ -6,11 +6,10 @@
 
 #include <Eigen/Core>
 
-#include "krot/base/disjoint_sets.h"
 #include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/geometry/transform.h"
-#include "krot/linear/small_matrices.h"
+#include "krot/linear/blocks.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {

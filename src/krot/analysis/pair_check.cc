@@ -8,7 +8,6 @@
 #include <Eigen/Geometry>
 
 #include "krot/analysis/epipolar.h"
-#include "krot/base/disjoint_sets.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/model/rigs.h"

@@ -12,7 +12,7 @@
 #include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/geometry/transform.h"
-#include "krot/linear/small_matrices.h"
+#include "krot/linear/blocks.h"
 
 namespace krot::internal {
 namespace {

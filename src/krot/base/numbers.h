@@ -48,6 +48,22 @@ std::vector<Number> NumbersUpTo(int64_t count) {
   return numbers;
 }
 
+// The indices in [0, count) for which `holds` is true, ascending.
+template <typename Holds>
+std::vector<int64_t> IndicesWhere(int64_t count, const Holds& holds) {
+  std::vector<int64_t> indices;
+  for (int64_t i = 0; i < count; ++i) {
+    if (holds(i)) indices.push_back(i);
+  }
+  return indices;
+}
+
+// The number of elements, signed as indices are.
+template <typename Container>
+int64_t SignedSize(const Container& container) {
+  return static_cast<int64_t>(container.size());
+}
+
 // Sorts by what `key` gives for a value, a member or a function: the largest
 // first, and equal ones in the order in which they are.
 template <typename Value, typename Key>
@@ -114,5 +130,30 @@ std::vector<double> GroupMedians(const std::vector<double>& values,
 
 // The lower median of all values, likewise.
 double MedianOf(const std::vector<double>& values, const Context& context);
+
+// Union-find with path halving over 0, 1, ..., count - 1. At first each member
+// is a set of its own. The root of a set is its smallest member.
+class DisjointSets {
+ public:
+  explicit DisjointSets(int64_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0);
+  }
+
+  int64_t Find(int64_t member) {
+    while (parent_[member] != member) {
+      parent_[member] = parent_[parent_[member]];
+      member = parent_[member];
+    }
+    return member;
+  }
+
+  void Unite(int64_t a, int64_t b) {
+    const auto [low, high] = std::minmax({Find(a), Find(b)});
+    parent_[high] = low;
+  }
+
+ private:
+  std::vector<int64_t> parent_;
+};
 
 }  // namespace krot::internal

@@ -145,7 +145,6 @@ struct SlackSolution {
   InteriorPointTermination termination = InteriorPointTermination::kNotRun;
   int iterations = 0;
   std::vector<double> slack;  // c_i sigma_i over the weight, pixels
-  std::vector<double> price;  // lambda_i / c_i, in [0, 1]
 };
 
 // The problem must be connected; depths of `*estimate` need not be positive. If

@@ -8,12 +8,8 @@
 #include <Eigen/LU>
 
 #include "krot/base/numbers.h"
-#include "krot/conic/cones.h"
 #include "krot/conic/interior_point.h"
-#include "krot/linear/ordered_sums.h"
-#include "krot/linear/schur_complement.h"
-#include "krot/problem/centre_unknowns.h"
-#include "krot/problem/cost.h"
+#include "krot/conic/path_following.h"
 
 namespace krot::internal {
 
@@ -75,11 +71,12 @@ struct ConeProgram {
 // f may be computed from lambda() and from the last target() and direction().
 // Restore sets direction() to an earlier one, but not target().
 template <typename ConeType>
-class NewtonSystem {
+class NewtonSystem : public ConeSystem<ConeType, ConeType::kDim> {
+  using Base = ConeSystem<ConeType, ConeType::kDim>;
+
  public:
-  using Cone = ConeType;
-  using Vector = typename Cone::Vector;
-  using Vector3d = Eigen::Vector3d;
+  using typename Base::Cone, typename Base::Direction, typename Base::Vector,
+      typename Base::Vector3d;
   static constexpr int kNumCorrectors = 2;
   static constexpr bool kGapAfterOwnSteps = false;
 
@@ -93,31 +90,12 @@ class NewtonSystem {
 
   NewtonSystem(const KnownRotationProblem& problem, const ConeProgram& program,
                Norm norm, int num_threads)
-      : problem_(problem),
+      : Base(problem, norm, num_threads),
         program_(program),
-        loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
         has_free_scale_(program.IsCost() && IsScaleFree(problem)),
-        structure_(AnchoredStructure(problem)),
-        rig_from_world_(RigFromWorldRotations(problem)),
-        T_(ConeMap<kDim>(norm)),
-        least_squares_(structure_, {num_threads}),
         scaling_(problem.observations.size()),
-        lambda_(problem.observations.size()),
         border_(problem.observations.size()),
-        rest_(problem.observations.size()),
-        target_(problem.observations.size()) {
-    direction_.ds.resize(problem.observations.size());
-    direction_.dz.resize(problem.observations.size());
-  }
-
-  // Sets state->viewed, the depth and v of every observation, from x.
-  void ViewAll(State* state) const {
-    state->viewed.resize(problem_.observations.size());
-    loop_.ForEach([&](int64_t i) {
-      state->viewed[i] =
-          ViewPoint(problem_, problem_.observations[i], state->x);
-    });
-  }
+        rest_(problem.observations.size()) {}
 
   // s = T (top; v)
   Vector Slack(const State& state, int64_t i) const {
@@ -137,7 +115,7 @@ class NewtonSystem {
   void Move(const State& from, double step, State* to) const {
     MoveCentres(rig_from_world_, from.x, step, direction_.dx, &to->x);
     to->scalar = from.scalar + step * direction_.dscalar;
-    ViewAll(to);
+    Base::ViewAll(to);
   }
 
   // Whether two iterates are near enough for the gauge and for the
@@ -152,25 +130,17 @@ class NewtonSystem {
 
   // Scales and factorises at an iterate; false if there is no factor.
   bool Factorize(const State& at) {
-    using Rows = Eigen::Matrix<double, kDim, 3, Eigen::RowMajor>;
     const double top_per_depth = program_.TopPerDepth(at.scalar);
     loop_.ForEach([&](int64_t i) {
       scaling_[i] = NtScaling<Cone>(Slack(at, i), at.z[i]);
       lambda_[i] = scaling_[i].Apply(at.z[i]);
       border_[i] = scaling_[i].ApplyInverse(
           T_.col(0) * program_.TopPerScalar(at.viewed[i].depth));
-      const Observation& o = problem_.observations[i];
-      Eigen::Matrix3d E = o.E;
-      E.row(0) *= top_per_depth;
-      Rows rows;  // of x_cam
-      for (int c = 0; c < 3; ++c) {
-        rows.col(c) = scaling_[i].ApplyInverse(T_ * E.col(c));
-      }
-      Eigen::Map<Rows>(least_squares_.rows(i)).noalias() =
-          rows * problem_.views[o.view].cam_from_world_rotation;
+      Base::SetRows(i, top_per_depth, [&](const Vector& column) {
+        return scaling_[i].ApplyInverse(column);
+      });
     });
-    mu_ = loop_.Sum([&](int64_t i) { return lambda_[i].squaredNorm(); }) /
-          static_cast<double>(loop_.count() * Cone::kDegree);
+    Base::FindMu();
     if (!least_squares_.Factorize()) return false;
 
     // Solutions for the right-hand sides that are columns of the border.
@@ -214,8 +184,6 @@ class NewtonSystem {
     least_squares_.SolveRefined(&missing, nullptr, &x, direction_.dz[0].data());
   }
 
-  const ObservationLoop& loop() const { return loop_; }
-  double mu() const { return mu_; }  // mean of s'z per degree of the cones
   // Linear programme: the largest change of h'x within the ellipsoid
   // |A dx| <= 1 with e'dx = 0.
   double ObjectiveLength() const {
@@ -227,16 +195,6 @@ class NewtonSystem {
     return std::sqrt(std::max(0.0, squared));
   }
 
-  const std::vector<Vector>& lambda() const { return lambda_; }
-  const std::vector<Vector>& target() const { return target_; }  // the last f
-
-  // The result of the last Solve; ds and dz are scaled by W.
-  struct Direction {
-    BlockVector dx;
-    double dscalar = 0;
-    std::vector<Vector> ds, dz;
-  };
-  const Direction& direction() const { return direction_; }
   void Restore(Direction direction) { direction_ = std::move(direction); }
   // The multipliers' direction, with the scaling removed.
   Vector UnscaledDz(int64_t i) const {
@@ -244,7 +202,10 @@ class NewtonSystem {
   }
 
  private:
-  static constexpr int kDim = Cone::kDim;
+  using Base::direction_, Base::gauge_, Base::lambda_, Base::least_squares_,
+      Base::loop_, Base::mu_, Base::problem_, Base::rig_from_world_,
+      Base::structure_, Base::T_, Base::target_, Base::x_gauge_,
+      Base::x_target_;
 
   // e = mean of c_i, in units of the median depth: e'dx is the change of the
   // mean depth. Apart from that unit e is the same in all iterations. Weights
@@ -312,26 +273,13 @@ class NewtonSystem {
     });
   }
 
-  const KnownRotationProblem& problem_;
   const ConeProgram program_;
-  const ObservationLoop loop_;
   const bool has_free_scale_;
-  const BlockStructure structure_;
-  const std::vector<Eigen::Matrix3d> rig_from_world_;
-  const Eigen::Matrix<double, kDim, 3> T_;
-  CentredLeastSquares<kDim> least_squares_;
-  double mu_ = 0;
   double small_depth_ = 0;
   std::vector<NtScaling<Cone>> scaling_;
-  std::vector<Vector> lambda_;
   std::vector<Vector> border_;  // b: the column of g
   std::vector<Vector> rest_;    // b - A Xb
-  std::vector<Vector> target_;  // f
-  BlockVector gauge_;           // e
   BlockVector x_border_;        // Xb = H^-1 A'b; linear programme: H^-1 h
-  BlockVector x_gauge_;         // Xe = H^-1 e
-  BlockVector x_target_;        // Xf = H^-1 A'f
-  Direction direction_;
 };
 
 }  // namespace krot::internal

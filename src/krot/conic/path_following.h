@@ -5,9 +5,16 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "krot/base/context.h"
+#include "krot/base/numbers.h"
 #include "krot/conic/cones.h"
 #include "krot/conic/interior_point.h"
+#include "krot/linear/ordered_sums.h"
+#include "krot/linear/schur_complement.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
 
 namespace krot::internal {
 
@@ -72,6 +79,88 @@ double Backtrack(double longest, const TryStep& try_step) {
   return 0;
 }
 
+// What the Newton systems of cone programmes have in common. Each observation
+// has a pair s_i, z_i in the cone, scaled by W_i so that lambda_i = W_i z_i =
+// W_i^-1 s_i, and kRows rows of the normal equations. A direction is found for
+// targets f_i. x stands for points and for the frames' centres in the world.
+template <typename ConeType, int kRows>
+class ConeSystem {
+ public:
+  using Cone = ConeType;
+  using Vector = typename Cone::Vector;
+  using Vector3d = Eigen::Vector3d;
+
+  // ds and dz are scaled by W.
+  struct Direction {
+    BlockVector dx;
+    double dscalar = 0;  // of a programme's further unknown
+    std::vector<Vector> ds, dz;
+  };
+
+  // Sets state->viewed, the depth and v of every observation, from x.
+  template <typename State>
+  void ViewAll(State* state) const {
+    state->viewed.resize(problem_.observations.size());
+    loop_.ForEach([&](int64_t i) {
+      state->viewed[i] =
+          ViewPoint(problem_, problem_.observations[i], state->x);
+    });
+  }
+
+  const ObservationLoop& loop() const { return loop_; }
+  double mu() const { return mu_; }  // mean of s'z per degree of the cones
+  const std::vector<Vector>& lambda() const { return lambda_; }
+  const std::vector<Vector>& target() const { return target_; }  // the last f
+  const Direction& direction() const { return direction_; }      // for that
+
+ protected:
+  ConeSystem(const KnownRotationProblem& problem, Norm norm, int num_threads)
+      : problem_(problem),
+        loop_(SignedSize(problem.observations), num_threads),
+        structure_(AnchoredStructure(problem)),
+        rig_from_world_(RigFromWorldRotations(problem)),
+        T_(ConeMap<kRows>(norm)),
+        least_squares_(structure_, {num_threads}),
+        lambda_(problem.observations.size()),
+        target_(problem.observations.size()) {
+    direction_.ds.resize(problem.observations.size());
+    direction_.dz.resize(problem.observations.size());
+  }
+
+  // Sets the rows of observation i: row_of(column) for each column of T E,
+  // whose depth has the factor `top_per_depth`.
+  template <typename RowOf>
+  void SetRows(int64_t i, double top_per_depth, const RowOf& row_of) {
+    using Rows = Eigen::Matrix<double, kRows, 3, Eigen::RowMajor>;
+    const Observation& o = problem_.observations[i];
+    Eigen::Matrix3d E = o.E;
+    E.row(0) *= top_per_depth;
+    Rows rows;  // of x_cam
+    for (int c = 0; c < 3; ++c) rows.col(c) = row_of(T_ * E.col(c));
+    Eigen::Map<Rows>(least_squares_.rows(i)).noalias() =
+        rows * problem_.views[o.view].cam_from_world_rotation;
+  }
+  // Once lambda_ is set.
+  void FindMu() {
+    mu_ = loop_.Sum([&](int64_t i) { return lambda_[i].squaredNorm(); }) /
+          static_cast<double>(loop_.count() * Cone::kDegree);
+  }
+
+  const KnownRotationProblem& problem_;
+  const ObservationLoop loop_;
+  const BlockStructure structure_;
+  const std::vector<Eigen::Matrix3d> rig_from_world_;
+  const Eigen::Matrix<double, kRows, 3> T_;
+  CentredLeastSquares<kRows> least_squares_;
+  double mu_ = 0;
+  std::vector<Vector> lambda_;
+  std::vector<Vector> target_;
+  Direction direction_;
+  BlockVector gauge_;     // e
+  BlockVector x_gauge_;   // H^-1 e
+  BlockVector x_target_;  // H^-1 of the right-hand side of the targets
+};
+
 // The primal-dual method for cone programmes, in a wide neighbourhood of the
 // central path:
 //
@@ -82,11 +171,10 @@ double Backtrack(double longest, const TryStep& try_step) {
 //   TakeStep        tries the longest step, then shorter ones, until one is in
 //                   the neighbourhood: trial_ becomes now_
 //
-// `System` is the Newton system of a programme. It offers the Cone of its pairs
-// s_i, z_i; a State with x, viewed, z and gap; Slack(state, i), which is s_i;
-// Move and IsPlausible for trials; HasOneStep, whether primal and dual steps
-// must have the same length; and Solve for targets f, which finds a direction
-// with ds and dz scaled so that W z = W^-1 s = lambda().
+// `System` is the ConeSystem of a programme. It offers a State with x, viewed,
+// z and gap; Slack(state, i), which is s_i; Move and IsPlausible for trials;
+// HasOneStep, whether primal and dual steps must have the same length; and
+// Solve for targets f, which finds a direction.
 template <typename System>
 class ConePath {
  public:

@@ -295,15 +295,15 @@ class TrackError {
         errors_before_px_(errors_before_px),
         norm_(norm),
         images_(ImageGeometries(model)),
-        image_indices_(ImageIndices(model)) {}
+        image_of_(ImagesOfElements(model)) {}
 
   double operator()(const Point3D& point, const Vector3d& xyz) const {
     double largest = 0;
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
       if (!std::isfinite(errors_before_px_[e])) continue;
-      const TrackElement& element = model_.track_elements[e];
-      const int32_t n = image_indices_.at(element.image_id);
-      const Point2D& point2D = model_.images[n].points2D[element.point2D_idx];
+      const int32_t n = image_of_[e];
+      const Point2D& point2D =
+          model_.images[n].points2D[model_.track_elements[e].point2D_idx];
       const Camera& camera = model_.cameras[images_[n].camera];
       const auto error = ProjectionError(camera, {point2D.x, point2D.y},
                                          images_[n].cam_from_world * xyz);
@@ -313,9 +313,8 @@ class TrackError {
     return largest;
   }
 
-  const std::vector<ImageGeometry>& images() const { return images_; }
-  int32_t ImageOf(const TrackElement& element) const {
-    return image_indices_.at(element.image_id);
+  Vector3d CentreOf(uint64_t e) const {  // of the element's camera
+    return Center(images_[image_of_[e]].cam_from_world);
   }
 
  private:
@@ -323,7 +322,7 @@ class TrackError {
   const std::vector<double>& errors_before_px_;
   const Norm norm_;
   const std::vector<ImageGeometry> images_;
-  const std::unordered_map<ImageId, int32_t> image_indices_;
+  const std::vector<int32_t> image_of_;  // each track element's
 };
 
 }  // namespace
@@ -347,10 +346,8 @@ void CarryLeftOutPoints(const Model& before,
     double lowest = error_after(point, start);
     for (uint64_t e = point.track_begin;
          e < point.track_end && lowest > allowed; ++e) {
-      const int32_t n = error_after.ImageOf(after->track_elements[e]);
       const Vector3d xyz =
-          start + (Center(error_after.images()[n].cam_from_world) -
-                   Center(error_before.images()[n].cam_from_world));
+          start + (error_after.CentreOf(e) - error_before.CentreOf(e));
       const double error = error_after(point, xyz);
       if (!(error < lowest)) continue;
       lowest = error;

@@ -288,8 +288,9 @@ Eigen::Vector3d Reprojection::InCamera(const Estimate& estimate,
   const KnownRotationProblem& problem = built_.problem;
   const Observation& observation = problem.observations[i];
   const View& view = problem.views[observation.view];
-  const AffineMap map = CamFromWorld(view, estimate.translations[view.frame]);
-  return map.leftCols<3>() * estimate.points[observation.point] + map.col(3);
+  return internal::InCamera(
+      CamFromWorld(view, estimate.translations[view.frame]),
+      estimate.points[observation.point]);
 }
 
 double Reprojection::Error(const Estimate& estimate, Norm norm,
@@ -341,11 +342,10 @@ bool Reprojection::TakeRows(const Estimate& estimate, int num_threads,
     if (!built_.HasPixel(i)) return;
     Observation& observation = problem->observations[i];
     const Intrinsics& source = sources_[observation.view];
-    const AffineMap& camera = cameras[observation.view];
-    const Vector3d x_cam =
-        camera.leftCols<3>() * estimate.points[observation.point] +
-        camera.col(3);
-    const auto row = RowAtProjection(source, built_.pixels[i], x_cam);
+    const auto row =
+        RowAtProjection(source, built_.pixels[i],
+                        internal::InCamera(cameras[observation.view],
+                                           estimate.points[observation.point]));
     if (row) {
       observation.E = *row;
       if (!built_.scales.empty()) {

@@ -11,7 +11,7 @@
 #include "krot/linear/ordered_sums.h"
 #include "krot/linear/schur_complement.h"
 #include "krot/math/norm.h"
-#include "krot/problem/centre_unknowns.h"
+#include "krot/problem/gauge.h"
 
 namespace krot::internal {
 

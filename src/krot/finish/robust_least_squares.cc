@@ -7,8 +7,8 @@
 #include "krot/base/numbers.h"
 #include "krot/linear/ordered_sums.h"
 #include "krot/linear/schur_complement.h"
-#include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
 
 namespace krot::internal {
 namespace {

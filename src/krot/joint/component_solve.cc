@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "krot/joint/joint.h"
-#include "krot/joint/working_set.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"

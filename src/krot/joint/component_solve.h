@@ -9,7 +9,6 @@
 
 #include "krot/conic/interior_point.h"
 #include "krot/joint/joint.h"
-#include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"

@@ -9,7 +9,6 @@
 #include "krot/base/check.h"
 #include "krot/base/context.h"
 #include "krot/joint/component_solve.h"
-#include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"

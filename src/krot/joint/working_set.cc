@@ -1,4 +1,4 @@
-#include "krot/joint/working_set.h"
+#include "krot/joint/joint.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/problem/cost.h"
 #include "krot/sweeps/res_int.h"
@@ -288,12 +289,8 @@ void WorkingSet::AddAll() {
 }
 
 std::vector<int64_t> WorkingSet::Observations() const {
-  std::vector<int64_t> observations;
-  observations.reserve(num_observations_here_);
-  for (size_t i = 0; i < takes_.size(); ++i) {
-    if (takes_[i] != 0) observations.push_back(static_cast<int64_t>(i));
-  }
-  return observations;
+  return IndicesWhere(SignedSize(takes_),
+                      [&](int64_t i) { return takes_[i] != 0; });
 }
 
 double WorkingSet::Cost(const Estimate& estimate, Norm norm) const {

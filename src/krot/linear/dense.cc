@@ -12,7 +12,6 @@
 #include "krot/base/vector_units.h"
 #include "krot/linear/blocks.h"
 #include "krot/linear/native_kernels.h"
-#include "krot/linear/small_matrices.h"
 
 namespace krot::internal {
 

@@ -39,61 +39,32 @@ struct LaneMask {
   Vector v[kVectors];
 };
 
-inline Lanes operator+(const Lanes& a, const Lanes& b) {
-  Lanes c;
-  for (int i = 0; i < kVectors; ++i) c.v[i] = a.v[i] + b.v[i];
-  return c;
-}
-inline Lanes operator-(const Lanes& a, const Lanes& b) {
-  Lanes c;
-  for (int i = 0; i < kVectors; ++i) c.v[i] = a.v[i] - b.v[i];
-  return c;
-}
-inline Lanes operator*(const Lanes& a, const Lanes& b) {
-  Lanes c;
-  for (int i = 0; i < kVectors; ++i) c.v[i] = a.v[i] * b.v[i];
-  return c;
-}
-inline Lanes operator/(const Lanes& a, const Lanes& b) {
-  Lanes c;
-  for (int i = 0; i < kVectors; ++i) c.v[i] = a.v[i] / b.v[i];
-  return c;
-}
+// Defines an operator that acts on each vector of its operands.
+#define KROT_LANE_OPERATOR(Result, op, Operand)                   \
+  inline Result operator op(const Operand& a, const Operand& b) { \
+    Result c;                                                     \
+    for (int i = 0; i < kVectors; ++i) c.v[i] = a.v[i] op b.v[i]; \
+    return c;                                                     \
+  }
+KROT_LANE_OPERATOR(Lanes, +, Lanes)
+KROT_LANE_OPERATOR(Lanes, -, Lanes)
+KROT_LANE_OPERATOR(Lanes, *, Lanes)
+KROT_LANE_OPERATOR(Lanes, /, Lanes)
+KROT_LANE_OPERATOR(LaneMask, <, Lanes)
+KROT_LANE_OPERATOR(LaneMask, <=, Lanes)
+KROT_LANE_OPERATOR(LaneMask, ==, Lanes)
+KROT_LANE_OPERATOR(LaneMask, &, LaneMask)
+KROT_LANE_OPERATOR(LaneMask, |, LaneMask)
+#undef KROT_LANE_OPERATOR
+
 inline Lanes operator-(const Lanes& a) {
   Lanes c;
   for (int i = 0; i < kVectors; ++i) c.v[i] = -a.v[i];
   return c;
 }
 inline Lanes& operator+=(Lanes& a, const Lanes& b) { return a = a + b; }
-
-inline LaneMask operator<(const Lanes& a, const Lanes& b) {
-  LaneMask c;
-  for (int i = 0; i < kVectors; ++i) c.v[i] = a.v[i] < b.v[i];
-  return c;
-}
-inline LaneMask operator<=(const Lanes& a, const Lanes& b) {
-  LaneMask c;
-  for (int i = 0; i < kVectors; ++i) c.v[i] = a.v[i] <= b.v[i];
-  return c;
-}
-inline LaneMask operator==(const Lanes& a, const Lanes& b) {
-  LaneMask c;
-  for (int i = 0; i < kVectors; ++i) c.v[i] = a.v[i] == b.v[i];
-  return c;
-}
 inline LaneMask operator>(const Lanes& a, const Lanes& b) { return b < a; }
 inline LaneMask operator>=(const Lanes& a, const Lanes& b) { return b <= a; }
-
-inline LaneMask operator&(const LaneMask& a, const LaneMask& b) {
-  LaneMask c;
-  for (int i = 0; i < kVectors; ++i) c.v[i] = a.v[i] & b.v[i];
-  return c;
-}
-inline LaneMask operator|(const LaneMask& a, const LaneMask& b) {
-  LaneMask c;
-  for (int i = 0; i < kVectors; ++i) c.v[i] = a.v[i] | b.v[i];
-  return c;
-}
 inline LaneMask operator~(const LaneMask& a) {
   LaneMask c;
   for (int i = 0; i < kVectors; ++i) c.v[i] = ~a.v[i];

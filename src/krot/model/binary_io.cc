@@ -1,13 +1,12 @@
 #include "krot/model/formats.h"
 
+#include <algorithm>
 #include <cstdint>
-#include <cstring>
+#include <optional>
 #include <string>
-#include <string_view>
 #include <type_traits>
 
 #include "krot/camera/camera_model.h"
-#include "krot/context.h"
 
 namespace krot::internal {
 namespace {
@@ -15,93 +14,6 @@ namespace {
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
               "COLMAP's binary files are read and written as they lie in "
               "memory, which must be little endian");
-
-// Reads the packed little-endian values of a file in memory one after another.
-// Every read is checked against the file's end and throws ModelError beyond it;
-// `what` names in the message what was expected there ("the camera's width").
-class BinaryReader {
- public:
-  // Keeps a reference to `file`.
-  explicit BinaryReader(const FileBytes& file) : file_(file) {}
-
-  template <typename T>
-  T Read(const char* what) {
-    T value;
-    ReadArray(&value, 1, what);
-    return value;
-  }
-
-  // Fills values[0, count). The bytes are copied, so T must have no padding.
-  template <typename T>
-  void ReadArray(T* values, size_t count, const char* what) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    const size_t num_bytes = count * sizeof(T);
-    if (num_bytes > BytesLeft()) FailTruncated(num_bytes, what);
-    if (num_bytes == 0) return;
-    std::memcpy(values, file_.bytes.data() + offset_, num_bytes);
-    offset_ += num_bytes;
-  }
-
-  // Reads the number of records that follow, each of which takes
-  // `min_record_bytes` or more. Fails if the rest of the file cannot hold so
-  // many, so that memory may be reserved for them.
-  template <typename Count>
-  size_t ReadCount(size_t min_record_bytes, const char* what) {
-    const size_t start = offset_;
-    const Count count = Read<Count>(what);
-    const size_t limit = BytesLeft() / min_record_bytes;
-    if (count > limit) {
-      Fail(start, std::string(what) + " = " + std::to_string(count),
-           "at most " + std::to_string(limit) + " (" +
-               std::to_string(BytesLeft()) + " bytes are left)");
-    }
-    return static_cast<size_t>(count);
-  }
-
-  // The characters up to the next '\0', which is skipped as well.
-  std::string_view ReadString(const char* what) {
-    const char* begin = file_.bytes.data() + offset_;
-    const void* end = std::memchr(begin, '\0', BytesLeft());
-    if (end == nullptr) {
-      Fail(offset_, "no zero byte before the end of the file",
-           std::string("one that ends ") + what);
-    }
-    const auto length =
-        static_cast<size_t>(static_cast<const char*>(end) - begin);
-    offset_ += length + 1;
-    return {begin, length};
-  }
-
-  void ExpectEnd() const {
-    if (BytesLeft() == 0) return;
-    Fail(offset_,
-         std::to_string(BytesLeft()) + " more bytes after the last record",
-         "the end of the file");
-  }
-
-  // The offset of the next value; Fail takes it.
-  size_t offset() const { return offset_; }
-
-  // "cameras.bin, byte 12: found ..., expected ...".
-  [[noreturn]] void Fail(size_t offset, const std::string& found,
-                         const std::string& expected) const {
-    throw ModelError(file_.path + ", byte " + std::to_string(offset) +
-                     ": found " + found + ", expected " + expected);
-  }
-
-  size_t BytesLeft() const { return file_.bytes.size() - offset_; }
-
- private:
-  [[noreturn]] void FailTruncated(size_t num_bytes, const char* what) const {
-    Fail(offset_,
-         "the end of the file after " + std::to_string(BytesLeft()) +
-             " more bytes",
-         std::to_string(num_bytes) + " bytes: " + what);
-  }
-
-  const FileBytes& file_;
-  size_t offset_ = 0;
-};
 
 // These records have the same layout in memory as in the file.
 static_assert(sizeof(Point2D) == 24 && std::is_trivially_copyable_v<Point2D>);
@@ -111,11 +23,6 @@ static_assert(sizeof(FrameData) == 16 &&
               std::has_unique_object_representations_v<FrameData>);
 static_assert(sizeof(SensorId) == 8 &&
               std::has_unique_object_representations_v<SensorId>);
-
-// The smallest size of one record in bytes, with empty lists.
-constexpr size_t kPoseBytes = 7 * sizeof(double);
-constexpr size_t kImageBytes = 4 + kPoseBytes + 4 + 1 + 8;
-constexpr size_t kPoint3DBytes = 8 + 24 + 3 + 8 + 8;
 
 Pose ReadPose(BinaryReader* reader, const char* what) {
   double values[7];
@@ -184,32 +91,6 @@ void ReadFrame(BinaryReader* reader, Frame* frame) {
                     "the data ids of a frame");
 }
 
-void ReadImage(BinaryReader* reader, Image* image) {
-  image->id = reader->Read<uint32_t>("an image id");
-  image->cam_from_world = ReadPose(reader, "the pose of an image");
-  image->camera_id = reader->Read<uint32_t>("the camera id of an image");
-  image->name = reader->ReadString("the name of an image");
-  image->points2D.resize(
-      reader->ReadCount<uint64_t>(sizeof(Point2D), "number of 2D points"));
-  reader->ReadArray(image->points2D.data(), image->points2D.size(),
-                    "the 2D points of an image");
-}
-
-void ReadPoint3D(BinaryReader* reader, Point3D* point,
-                 std::vector<TrackElement>* track_elements) {
-  point->id = reader->Read<uint64_t>("a 3D point id");
-  reader->ReadArray(point->xyz.data(), 3, "the coordinates of a 3D point");
-  reader->ReadArray(point->color.data(), 3, "the colour of a 3D point");
-  point->error = reader->Read<double>("the error of a 3D point");
-  const size_t length =
-      reader->ReadCount<uint64_t>(sizeof(TrackElement), "track length");
-  point->track_begin = track_elements->size();
-  point->track_end = point->track_begin + length;
-  track_elements->resize(point->track_end);
-  reader->ReadArray(track_elements->data() + point->track_begin, length,
-                    "the track of a 3D point");
-}
-
 template <typename T>
 void Append(const T* values, size_t count, std::string* bytes) {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -228,6 +109,87 @@ void AppendPose(const Pose& pose, std::string* bytes) {
 }
 
 }  // namespace
+
+BinaryReader::BinaryReader(const std::filesystem::path& path)
+    : path_(path.string()) {
+  file_.emplace(path, FileDescriptor::Use::kRead);
+  const std::optional<int64_t> size =
+      file_->is_open() ? file_->RegularSize() : std::nullopt;
+  if (!size) throw ModelError(path_ + ": cannot be read");
+  size_ = static_cast<size_t>(*size);
+}
+
+void BinaryReader::MoveWindow(size_t num_bytes) {
+  begin_ = offset_;
+  const size_t size =
+      std::min(BytesLeft(), std::max<size_t>(num_bytes, 1 << 20));
+  if (!file_->ReadAt(static_cast<int64_t>(begin_), size, &memory_) ||
+      memory_.size() != size) {
+    throw ModelError(path_ + ": cannot be read");
+  }
+  window_ = memory_;
+}
+
+std::string BinaryReader::ReadString(const char* what) {
+  const size_t start = offset_;
+  std::string text;
+  while (BytesLeft() > 0) {
+    const char c = Read<char>(what);
+    if (c == '\0') return text;
+    text += c;
+  }
+  Fail(start, "no zero byte before the end of the file",
+       std::string("one that ends ") + what);
+}
+
+void BinaryReader::ExpectEnd() const {
+  if (BytesLeft() == 0) return;
+  Fail(offset_,
+       std::to_string(BytesLeft()) + " more bytes after the last record",
+       "the end of the file");
+}
+
+void BinaryReader::Fail(size_t offset, const std::string& found,
+                        const std::string& expected) const {
+  throw ModelError(path_ + ", byte " + std::to_string(offset) + ": found " +
+                   found + ", expected " + expected);
+}
+
+void BinaryReader::FailTruncated(size_t num_bytes, const char* what) const {
+  Fail(offset_,
+       "the end of the file after " + std::to_string(BytesLeft()) +
+           " more bytes",
+       std::to_string(num_bytes) + " bytes: " + what);
+}
+
+void ReadImageHead(BinaryReader* reader, Image* image) {
+  image->id = reader->Read<uint32_t>("an image id");
+  image->cam_from_world = ReadPose(reader, "the pose of an image");
+  image->camera_id = reader->Read<uint32_t>("the camera id of an image");
+  image->name = reader->ReadString("the name of an image");
+}
+
+void ReadPoints2D(BinaryReader* reader, std::vector<Point2D>* points2D) {
+  points2D->resize(
+      reader->ReadCount<uint64_t>(sizeof(Point2D), "number of 2D points"));
+  reader->ReadArray(points2D->data(), points2D->size(),
+                    "the 2D points of an image");
+}
+
+void ReadPoint3D(BinaryReader* reader, Point3D* point,
+                 std::vector<TrackElement>* track_elements) {
+  point->id = reader->Read<uint64_t>("a 3D point id");
+  reader->ReadArray(point->xyz.data(), 3, "the coordinates of a 3D point");
+  reader->ReadArray(point->color.data(), 3, "the colour of a 3D point");
+  point->error = reader->Read<double>("the error of a 3D point");
+  const size_t length =
+      reader->ReadCount<uint64_t>(sizeof(TrackElement), "track length");
+  point->track_begin = track_elements->size();
+  point->track_end = point->track_begin + length;
+  track_elements->resize(point->track_end);
+  reader->ReadArray(track_elements->data() + point->track_begin, length,
+                    "the track of a 3D point");
+}
 
 void ParseCamerasBinary(const FileBytes& file, Model* model) {
   BinaryReader reader(file);
@@ -256,7 +218,10 @@ void ParseImagesBinary(const FileBytes& file, Model* model) {
   BinaryReader reader(file);
   model->images.resize(
       reader.ReadCount<uint64_t>(kImageBytes, "number of images"));
-  for (Image& image : model->images) ReadImage(&reader, &image);
+  for (Image& image : model->images) {
+    ReadImageHead(&reader, &image);
+    ReadPoints2D(&reader, &image.points2D);
+  }
   reader.ExpectEnd();
 }
 

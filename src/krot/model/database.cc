@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "krot/base/numbers.h"
+#include "krot/model/model_io.h"
 #include "krot/model/sqlite_rows.h"
 
 namespace krot {
@@ -65,24 +66,16 @@ ImageOfId JoinImages(const Model& model, SqliteDatabase* database) {
 
 double Correlation(const std::vector<Eigen::Vector2d>& keypoints,
                    const std::vector<Point2D>& points2D, int axis) {
-  const auto value = [&](size_t i) {
-    return axis == 0 ? points2D[i].x : points2D[i].y;
-  };
-  double mean_a = 0, mean_b = 0;
-  const auto n = static_cast<double>(keypoints.size());
+  Eigen::VectorXd a(keypoints.size()), b(keypoints.size());
   for (size_t i = 0; i < keypoints.size(); ++i) {
-    mean_a += keypoints[i][axis] / n;
-    mean_b += value(i) / n;
+    a[i] = keypoints[i][axis];
+    b[i] = axis == 0 ? points2D[i].x : points2D[i].y;
   }
-  double aa = 0, ab = 0, bb = 0;
-  for (size_t i = 0; i < keypoints.size(); ++i) {
-    const double a = keypoints[i][axis] - mean_a, b = value(i) - mean_b;
-    aa += a * a;
-    ab += a * b;
-    bb += b * b;
-  }
+  a.array() -= a.mean();
+  b.array() -= b.mean();
+  const double lengths = a.norm() * b.norm();
   // Coordinates that are all the same do not contradict anything.
-  return aa * bb > 0 ? ab / std::sqrt(aa * bb) : 1;
+  return lengths > 0 ? a.dot(b) / lengths : 1;
 }
 
 // Whether an image's 2D points are these keypoints one by one, although the

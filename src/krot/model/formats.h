@@ -1,14 +1,18 @@
 #pragma once
 
 #include <cmath>
+#include <cstring>
+#include <filesystem>
 #include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "krot/base/numbers.h"
+#include "krot/base/system.h"
 #include "krot/context.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"
@@ -34,6 +38,97 @@ std::string FormatRigsBinary(const Model& model);
 std::string FormatFramesBinary(const Model& model);
 std::string FormatImagesBinary(const Model& model);
 std::string FormatPoints3DBinary(const Model& model);
+
+// Reads the packed little-endian values of a file one after another. Every read
+// is checked against the file's end and throws ModelError beyond it; `what`
+// names in the message what was expected there ("the camera's width").
+class BinaryReader {
+ public:
+  // Of a file in memory. Keeps a reference to `file`.
+  explicit BinaryReader(const FileBytes& file)
+      : path_(file.path), size_(file.bytes.size()), window_(file.bytes) {}
+  // Of a file on the disk, with a mebibyte of it in memory. Throws ModelError
+  // if that cannot be read.
+  explicit BinaryReader(const std::filesystem::path& path);
+
+  template <typename T>
+  T Read(const char* what) {
+    T value;
+    ReadArray(&value, 1, what);
+    return value;
+  }
+
+  // Fills values[0, count). The bytes are copied, so T must have no padding.
+  template <typename T>
+  void ReadArray(T* values, size_t count, const char* what) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    const size_t num_bytes = count * sizeof(T);
+    if (num_bytes > BytesLeft()) FailTruncated(num_bytes, what);
+    if (num_bytes == 0) return;
+    if (offset_ < begin_ || offset_ + num_bytes > begin_ + window_.size()) {
+      MoveWindow(num_bytes);
+    }
+    std::memcpy(values, window_.data() + (offset_ - begin_), num_bytes);
+    offset_ += num_bytes;
+  }
+
+  // Reads the number of records that follow, each of which takes
+  // `min_record_bytes` or more. Fails if the rest of the file cannot hold so
+  // many, so that memory may be reserved for them.
+  template <typename Count>
+  size_t ReadCount(size_t min_record_bytes, const char* what) {
+    const size_t start = offset_;
+    const Count count = Read<Count>(what);
+    const size_t limit = BytesLeft() / min_record_bytes;
+    if (count > limit) {
+      Fail(start, std::string(what) + " = " + std::to_string(count),
+           "at most " + std::to_string(limit) + " (" +
+               std::to_string(BytesLeft()) + " bytes are left)");
+    }
+    return static_cast<size_t>(count);
+  }
+
+  // The characters up to the next '\0', which is skipped as well.
+  std::string ReadString(const char* what);
+
+  // Requires that there are so many bytes.
+  void Skip(size_t num_bytes) { offset_ += num_bytes; }
+  void Seek(size_t offset) { offset_ = offset; }
+  void ExpectEnd() const;
+
+  // The offset of the next value; Fail takes it.
+  size_t offset() const { return offset_; }
+  size_t BytesLeft() const { return size_ - offset_; }
+
+  // "cameras.bin, byte 12: found ..., expected ...".
+  [[noreturn]] void Fail(size_t offset, const std::string& found,
+                         const std::string& expected) const;
+
+ private:
+  [[noreturn]] void FailTruncated(size_t num_bytes, const char* what) const;
+  // Makes the next bytes part of the window.
+  void MoveWindow(size_t num_bytes);
+
+  const std::string path_;
+  std::optional<FileDescriptor> file_;  // on the disk
+  size_t size_ = 0;
+  size_t offset_ = 0;
+  size_t begin_ = 0;  // of the window, in the file
+  std::string_view window_;
+  std::string memory_;  // of the window of a file on the disk
+};
+
+// The smallest size of one record in bytes, with empty lists.
+inline constexpr size_t kPoseBytes = 7 * sizeof(double);
+inline constexpr size_t kImageBytes = 4 + kPoseBytes + 4 + 1 + 8;
+inline constexpr size_t kPoint3DBytes = 8 + 24 + 3 + 8 + 8;
+
+// Everything of an image but its 2D points; then these; and a 3D point with its
+// track.
+void ReadImageHead(BinaryReader* reader, Image* image);
+void ReadPoints2D(BinaryReader* reader, std::vector<Point2D>* points2D);
+void ReadPoint3D(BinaryReader* reader, Point3D* point,
+                 std::vector<TrackElement>* track_elements);
 
 // COLMAP's text files (docs/formats.md). Numbers are written with the fewest
 // digits that restore the same bits; a NaN keeps its sign but not its payload.

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <iomanip>
-#include <limits>
 #include <sstream>
 
 #include "krot/base/numbers.h"
@@ -87,7 +86,7 @@ std::vector<double> AnglesDeg(const Rotations& own, const Rotations& listed,
 // refined by the mean over the half of the images that fit it best. O(images).
 struct WorldTurn {
   Eigen::Quaterniond own_world_from_list = Eigen::Quaterniond::Identity();
-  double median_deg = std::numeric_limits<double>::infinity();
+  double median_deg = kInfinity;
 };
 WorldTurn FindWorldTurn(const Rotations& own, const Rotations& listed) {
   WorldTurn best;

@@ -174,7 +174,7 @@ Point3D ReadPoint3D(TextReader* reader,
   return point;
 }
 
-template <typename Record, typename Read>
+template <typename Read, typename Record>
 void ReadRecords(const FileBytes& file, const Read& read,
                  std::vector<Record>* records) {
   records->clear();
@@ -185,18 +185,15 @@ void ReadRecords(const FileBytes& file, const Read& read,
 }  // namespace
 
 void ParseCamerasText(const FileBytes& file, Model* model) {
-  const auto read = [](TextReader* reader) { return ReadCamera(reader); };
-  ReadRecords(file, read, &model->cameras);
+  ReadRecords<Camera(TextReader*)>(file, ReadCamera, &model->cameras);
 }
 
 void ParseRigsText(const FileBytes& file, Model* model) {
-  const auto read = [](TextReader* reader) { return ReadRig(reader); };
-  ReadRecords(file, read, &model->rigs);
+  ReadRecords<Rig(TextReader*)>(file, ReadRig, &model->rigs);
 }
 
 void ParseFramesText(const FileBytes& file, Model* model) {
-  const auto read = [](TextReader* reader) { return ReadFrame(reader); };
-  ReadRecords(file, read, &model->frames);
+  ReadRecords<Frame(TextReader*)>(file, ReadFrame, &model->frames);
 }
 
 void ParseImagesText(const FileBytes& file, Model* model) {

@@ -1,10 +1,10 @@
-#include "krot/outliers/conflict.h"
+#include "krot/outliers/removal.h"
 
 #include <algorithm>
 #include <iterator>
-#include <numeric>
 #include <utility>
 
+#include "krot/base/numbers.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
 #include "krot/joint/joint.h"
@@ -89,6 +89,10 @@ Decision Decide(const Model& model, const BuiltProblem& given,
   return decision;
 }
 
+namespace {
+
+// Proves in true pixels what Decide refuted; the proof is checked. None if lens
+// distortion takes up too much of the margin. Adds to `*work`.
 std::optional<PixelCertificate> ProveRefutation(
     const Model& model, const BuiltProblem& part, const ErrorBound& bound,
     const Decision& refuted, const Context& context, Work* work) {
@@ -127,8 +131,6 @@ std::optional<PixelCertificate> ProveRefutation(
   return best;
 }
 
-namespace {
-
 std::vector<int64_t> Without(const std::vector<int64_t>& from,
                              const std::vector<int64_t>& what) {
   std::vector<int64_t> rest;
@@ -143,61 +145,40 @@ std::vector<std::vector<int64_t>> Parts(
                              PruneUnconstrained(built.problem, observations));
 }
 
-// Makes a refuted support irreducible, within its own small problem.
-class Deletion {
- public:
-  Deletion(const Model& model, BuiltProblem support, const ErrorBound& bound,
-           const Context& context, Work* work)
-      : model_(model),
-        built_(std::move(support)),
-        bound_(bound),
-        context_(context),
-        work_(work),
-        kept_(built_.pixels.size()) {
-    std::iota(kept_.begin(), kept_.end(), 0);
-  }
-
-  // False if the support is too large, or if an observation is kept only
-  // because nothing was decided.
-  bool Run() {
-    if (kept_.size() > 60) return false;  // a solve per observation
-    bool is_irreducible = true;
-    std::vector<int64_t> untried = kept_;
-    while (!untried.empty() && !context_.IsCancelled()) {
-      const int64_t spared = untried.back();
-      untried.pop_back();
-      bool is_feasible = true;
-      for (const std::vector<int64_t>& part :
-           Parts(built_, Without(kept_, {spared}))) {
-        const ProblemSubset subset(built_.problem, part);
-        Decision decision =
-            Decide(model_, BuiltPart(built_, subset, built_.start), bound_,
-                   context_, work_);
-        is_feasible = is_feasible && decision.is_feasible;
-        if (!decision.is_refuted) continue;
-        is_feasible = true;
-        kept_ = subset.InWhole(std::move(decision.support));
-        std::vector<int64_t> left;
-        std::set_intersection(untried.begin(), untried.end(), kept_.begin(),
-                              kept_.end(), std::back_inserter(left));
-        untried = std::move(left);
-        break;
-      }
-      is_irreducible = is_irreducible && is_feasible;
+// Makes a refuted support irreducible: leaves in `*kept`, which are at first
+// all observations of its own small problem, those that are necessary. False if
+// the support is too large, or if an observation is kept only because nothing
+// was decided.
+bool MakeIrreducible(const Model& model, const BuiltProblem& support,
+                     const ErrorBound& bound, const Context& context,
+                     Work* work, std::vector<int64_t>* kept) {
+  if (kept->size() > 60) return false;  // a solve per observation
+  bool is_irreducible = true;
+  std::vector<int64_t> untried = *kept;
+  while (!untried.empty() && !context.IsCancelled()) {
+    const int64_t spared = untried.back();
+    untried.pop_back();
+    bool is_feasible = true;
+    for (const std::vector<int64_t>& part :
+         Parts(support, Without(*kept, {spared}))) {
+      const ProblemSubset subset(support.problem, part);
+      Decision decision =
+          Decide(model, BuiltPart(support, subset, support.start), bound,
+                 context, work);
+      is_feasible = is_feasible && decision.is_feasible;
+      if (!decision.is_refuted) continue;
+      is_feasible = true;
+      *kept = subset.InWhole(std::move(decision.support));
+      std::vector<int64_t> left;
+      std::set_intersection(untried.begin(), untried.end(), kept->begin(),
+                            kept->end(), std::back_inserter(left));
+      untried = std::move(left);
+      break;
     }
-    return is_irreducible;
+    is_irreducible = is_irreducible && is_feasible;
   }
-
-  const std::vector<int64_t>& kept() const { return kept_; }
-
- private:
-  const Model& model_;
-  const BuiltProblem built_;
-  const ErrorBound bound_;
-  const Context context_;
-  Work* const work_;
-  std::vector<int64_t> kept_;  // ascending
-};
+  return is_irreducible;
+}
 
 }  // namespace
 
@@ -212,11 +193,11 @@ std::optional<Conflict> FindConflict(const Model& model,
   if (!first.is_refuted) return std::nullopt;
 
   const ProblemSubset support(part.problem, first.support);
-  Deletion deletion(model, BuiltPart(part, support, part.start), bound, context,
-                    work);
+  auto kept = NumbersUpTo<int64_t>(SignedSize(first.support));
   Conflict conflict;
-  conflict.is_irreducible = deletion.Run();
-  conflict.observations = subset.InWhole(support.InWhole(deletion.kept()));
+  conflict.is_irreducible = MakeIrreducible(
+      model, BuiltPart(part, support, part.start), bound, context, work, &kept);
+  conflict.observations = subset.InWhole(support.InWhole(std::move(kept)));
   return conflict;
 }
 
@@ -239,49 +220,15 @@ bool ProveConflict(const Model& model, const BuiltProblem& built,
   return true;
 }
 
-std::vector<Conflict> PackConflicts(const Model& model,
-                                    const BuiltProblem& built,
-                                    const ErrorBound& bound,
-                                    const std::vector<int64_t>& observations,
-                                    const Context& context, Work* work) {
-  std::vector<Conflict> conflicts;
-  std::vector<std::vector<int64_t>> open = Parts(built, observations);
-  while (!open.empty() && !work->IsUsedUp() && !context.IsCancelled()) {
-    const std::vector<int64_t> part = std::move(open.back());
-    open.pop_back();
-    std::optional<Conflict> conflict =
-        FindConflict(model, built, bound, part, context, work);
-    if (!conflict ||
-        !ProveConflict(model, built, bound, context, &*conflict, work)) {
-      continue;
-    }
-    for (std::vector<int64_t>& rest :
-         Parts(built, Without(part, conflict->observations))) {
-      open.push_back(std::move(rest));
-    }
-    conflicts.push_back(*std::move(conflict));
-  }
-  return conflicts;
-}
-
 // A built problem has its observations in the order of the model's tracks.
 std::vector<uint64_t> ElementsOf(const Model& model,
                                  const BuiltProblem& built) {
-  const KnownRotationProblem& problem = built.problem;
+  const std::vector<Role> roles = RolesOf(model, built, SameImage::kKeep);
   std::vector<uint64_t> elements;
-  elements.reserve(problem.observations.size());
-  for (int32_t k = 0; k < problem.num_points; ++k) {
-    uint64_t e = model.points3D[built.point_of[k]].track_begin;
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i, ++e) {
-      const ImageId image =
-          model.images[built.image_of[problem.observations[i].view]].id;
-      while (model.track_elements[e].image_id != image ||
-             model.track_elements[e].point2D_idx !=
-                 static_cast<uint32_t>(built.point2D_of[i])) {
-        ++e;
-      }
-      elements.push_back(e);
+  for (const int32_t k : built.point_of) {
+    const Point3D& point = model.points3D[k];
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      if (roles[e] == Role::kIn) elements.push_back(e);
     }
   }
   return elements;

@@ -4,14 +4,12 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <utility>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "krot/base/numbers.h"
-#include "krot/outliers/parts.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/cost.h"
 
@@ -26,8 +24,8 @@ using Eigen::Vector3d;
 Vector3d CentreOf(const KnownRotationProblem& problem, const Estimate& estimate,
                   int64_t i) {
   const View& view = problem.views[problem.observations[i].view];
-  const AffineMap map = CamFromWorld(view, estimate.translations[view.frame]);
-  return -map.leftCols<3>().transpose() * map.col(3);
+  return internal::CentreOf(
+      CamFromWorld(view, estimate.translations[view.frame]));
 }
 
 }  // namespace
@@ -266,7 +264,7 @@ void TwoViewConflicts::AppendTriples(const HalfPlane& violated,
   for (const double use : {0.97, 0.8}) {
     const double m = -use * violated.slack;
     std::array<double, 2> least;
-    least.fill(std::numeric_limits<double>::infinity());
+    least.fill(kInfinity);
     std::array<const HalfPlane*, 2> best = {nullptr, nullptr};
     for (const HalfPlane& plane : planes) {
       const double cross = violated.normal.x() * plane.normal.y() -

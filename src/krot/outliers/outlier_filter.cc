@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include "krot/base/check.h"
 #include "krot/base/context.h"
+#include "krot/base/numbers.h"
 #include "krot/model/derived_models.h"
-#include "krot/outliers/conflict.h"
-#include "krot/outliers/parts.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/gauge.h"
@@ -21,12 +19,13 @@ namespace {
 // The ids of these observations' points; ascending.
 std::vector<uint64_t> PointIds(const Model& model, const BuiltProblem& built,
                                const std::vector<int64_t>& observations) {
-  std::set<uint64_t> ids;
+  std::vector<uint64_t> ids;
   for (const int64_t i : observations) {
     const int32_t point = built.problem.observations[i].point;
-    ids.insert(model.points3D[built.point_of[point]].id);
+    ids.push_back(model.points3D[built.point_of[point]].id);
   }
-  return {ids.begin(), ids.end()};
+  SortUnique(&ids);
+  return ids;
 }
 
 class OutlierFilter : private Filtering {
@@ -129,7 +128,7 @@ class OutlierFilter : private Filtering {
   // so, they are.
   bool KeepsAll(const BuiltProblem& built) {
     Model moved;
-    PlaceAt(built, {{}, built.start, {}}, &moved);
+    PlaceAt(built, {{}, built.start}, &moved);
     Solve(std::move(moved));
     if (context_.IsCancelled()) return false;
     if (!AreWithin(PixelErrors(kept_.model, context_.num_threads))) {
@@ -155,7 +154,7 @@ class OutlierFilter : private Filtering {
   // noise explains all errors.
   std::optional<Removal> RemoveFew(const BuiltProblem& built,
                                    std::vector<Conflict>* found) {
-    if (built.pixels.empty()) return Removal{{}, built.start, {}};
+    if (built.pixels.empty()) return Removal{{}, built.start};
     if (options_.make_profile) return MakeProfile(built, found);
     if (bound_.max_error == 0) {
       MeasureNoise(built);

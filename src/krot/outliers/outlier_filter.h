@@ -17,7 +17,6 @@
 #include "krot/model.h"
 #include "krot/model/derived_models.h"
 #include "krot/outliers.h"
-#include "krot/outliers/conflict.h"
 #include "krot/outliers/removal.h"
 #include "krot/pipeline/solve_model.h"
 

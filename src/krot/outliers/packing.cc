@@ -1,10 +1,10 @@
 #include "krot/outliers/removal.h"
 
 #include <algorithm>
-#include <numeric>
 #include <optional>
 #include <utility>
 
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
@@ -51,7 +51,6 @@ class Packing {
     Charge(&open);
     for (const int64_t i : open) is_free_[i] = 1;
     Charge(&open);
-    ChargeTight();
     return {std::move(conflicts_), is_complete_};
   }
 
@@ -127,6 +126,19 @@ class Packing {
     return std::nullopt;
   }
 
+  // What search(n, &work) finds for each n < count, all at once.
+  template <typename Search>
+  std::vector<std::optional<Conflict>> SearchAll(size_t count,
+                                                 const Search& search) {
+    std::vector<std::optional<Conflict>> found(count);
+    std::vector<Work> work(count);
+    ParallelFor(
+        SignedSize(found), 1, context_.num_threads,
+        [&](int64_t n, int64_t, int) { found[n] = search(n, &work[n]); });
+    for (const Work& own : work) work_.done += own.done;
+    return found;
+  }
+
   // Observations left in `open` found no conflict. Those whose conflict shares
   // observations with one found at the same time search again.
   void ChargeInTwoViews(std::vector<int64_t>* open) {
@@ -141,13 +153,10 @@ class Packing {
       std::vector<int64_t> all = queue;
       all.insert(all.end(), batch.begin(), batch.end());
       const std::vector<float> worth = Worths(problem_, is_free_, all);
-      std::vector<std::optional<Conflict>> found(batch.size());
-      std::vector<Work> work(batch.size());
-      ParallelFor(static_cast<int64_t>(batch.size()), 1, context_.num_threads,
-                  [&](int64_t n, int64_t, int) {
-                    found[n] = InTwoViews(batch[n], worth, &work[n]);
-                  });
-      for (const Work& own : work) work_.done += own.done;
+      std::vector<std::optional<Conflict>> found =
+          SearchAll(batch.size(), [&](int64_t n, Work* work) {
+            return InTwoViews(batch[n], worth, work);
+          });
       std::vector<int64_t> again;
       for (size_t n = 0; n < batch.size(); ++n) {
         if (!found[n]) {
@@ -171,12 +180,9 @@ class Packing {
   bool Charge(int64_t i, int num_others) {
     const std::vector<std::vector<int32_t>> sets =
         neighbourhoods_.FrameSets(i, num_others, is_free_);
-    std::vector<std::optional<Conflict>> found(sets.size());
-    std::vector<Work> work(sets.size());
-    ParallelFor(
-        static_cast<int64_t>(sets.size()), 1, context_.num_threads,
-        [&](int64_t n, int64_t, int) { found[n] = Try(i, sets[n], &work[n]); });
-    for (const Work& own : work) work_.done += own.done;
+    std::vector<std::optional<Conflict>> found =
+        SearchAll(sets.size(),
+                  [&](int64_t n, Work* work) { return Try(i, sets[n], work); });
     std::vector<std::pair<size_t, size_t>> smallest_first;
     for (size_t n = 0; n < found.size(); ++n) {
       if (found[n])
@@ -217,24 +223,6 @@ class Packing {
     ChargeInTwoViews(&crowded);
     ChargeInFrames(open);
     open->insert(open->begin(), crowded.begin(), crowded.end());
-  }
-
-  void ChargeTight() {
-    std::vector<int64_t> tight;
-    for (const int64_t i : removal_.tight) {
-      if (is_free_[i]) tight.push_back(i);
-    }
-    if (tight.empty() || tight.size() > 250 || !MayGoOn()) return;
-    const ProblemSubset subset(problem_, tight);
-    const BuiltProblem part = BuiltPart(built_, subset, built_.start);
-    std::vector<int64_t> all(tight.size());
-    std::iota(all.begin(), all.end(), 0);
-    for (Conflict& conflict :
-         PackConflicts(model_, part, bound_, all, small_context_, &work_)) {
-      conflict.observations = subset.InWhole(std::move(conflict.observations));
-      conflict.proof.rows = InWhole(subset, std::move(conflict.proof.rows));
-      Take(std::move(conflict));
-    }
   }
 
   void Take(Conflict conflict) {

@@ -1,10 +1,10 @@
-#include "krot/outliers/parts.h"
+#include "krot/outliers/robust_start.h"
 
 #include <algorithm>
 #include <tuple>
 #include <utility>
 
-#include "krot/base/disjoint_sets.h"
+#include "krot/base/numbers.h"
 #include "krot/problem/subset.h"
 
 namespace krot::internal {
@@ -232,11 +232,10 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
   for (int64_t i = 0; i < count; ++i) {
     num_agreeing[problem.FrameOf(i)] += agrees[i];
   }
-  std::vector<int64_t> ties;
-  for (int64_t i = 0; i < count; ++i) {
-    if (agrees[i] || num_agreeing[problem.FrameOf(i)] < 6) ties.push_back(i);
-  }
-  const ProblemSubset subset(problem, std::move(ties));
+  const ProblemSubset subset(problem, IndicesWhere(count, [&](int64_t i) {
+                               return agrees[i] ||
+                                      num_agreeing[problem.FrameOf(i)] < 6;
+                             }));
   const KnownRotationProblem& own = subset.problem();
   const std::vector<int32_t> parts = FindParts(own, options);
   std::vector<int32_t> part_of(problem.num_frames);

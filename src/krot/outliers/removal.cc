@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "krot/base/context.h"
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/conic/interior_point.h"
 #include "krot/convert/build_problem.h"
@@ -68,11 +67,9 @@ void NearSet::TieFrames() {
 }
 
 std::vector<std::vector<int64_t>> NearSet::Parts() const {
-  std::vector<int64_t> observations;
-  for (size_t i = 0; i < contains_.size(); ++i) {
-    if (contains_[i]) observations.push_back(static_cast<int64_t>(i));
-  }
-  return SplitIntoComponents(*problem_, std::move(observations));
+  return SplitIntoComponents(
+      *problem_, IndicesWhere(SignedSize(contains_),
+                              [&](int64_t i) { return Contains(i); }));
 }
 
 namespace {
@@ -83,11 +80,8 @@ constexpr double kDear = 0.03;
 // The observations whose errors are above a bound.
 std::vector<int64_t> Above(const std::vector<double>& errors,
                            double max_error) {
-  std::vector<int64_t> above;
-  for (size_t i = 0; i < errors.size(); ++i) {
-    if (!(errors[i] <= max_error)) above.push_back(static_cast<int64_t>(i));
-  }
-  return above;
+  return IndicesWhere(SignedSize(errors),
+                      [&](int64_t i) { return !(errors[i] <= max_error); });
 }
 
 }  // namespace
@@ -136,7 +130,6 @@ void RemovalSearch::Excess(const std::vector<int64_t>& part,
   const std::vector<double> weights =
       WeightsAgainst(solution.slack, level, kDear);
   for (size_t n = 0; n < part.size(); ++n) {
-    if (solution.price[n] > 1e-2) is_tight_[part[n]] = 1;
     weights_[part[n]] = weights[n];
   }
 }
@@ -222,7 +215,6 @@ Removal RemovalSearch::Find(double max_error, int max_programmes) {
   best.estimate = built_.start;
   best.observations = Above(Errors(built_.start), max_error_);
   Offer(&best);
-  is_tight_.assign(rows_.observations.size(), 0);
   if (weights_.empty()) weights_ = WeightsOfErrors();
   int num_idle = 0;
   for (int n = 0; n < max_programmes && !context_.IsCancelled(); ++n) {
@@ -241,9 +233,6 @@ Removal RemovalSearch::Find(double max_error, int max_programmes) {
   context_.Stage("taking back what fits");
   while (!context_.IsCancelled() && TakeBack(&best)) {
   }
-  for (size_t i = 0; i < is_tight_.size(); ++i) {
-    if (is_tight_[i]) best.tight.push_back(static_cast<int64_t>(i));
-  }
   return best;
 }
 
@@ -255,12 +244,9 @@ Removal FindRemoval(const Model& model, const BuiltProblem& built,
 }
 
 std::vector<int64_t> AllBut(const std::vector<int64_t>& removed, size_t count) {
-  std::vector<int64_t> all(count);
-  std::iota(all.begin(), all.end(), 0);
-  std::vector<int64_t> kept;
-  std::set_difference(all.begin(), all.end(), removed.begin(), removed.end(),
-                      std::back_inserter(kept));
-  return kept;
+  return IndicesWhere(static_cast<int64_t>(count), [&](int64_t i) {
+    return !std::binary_search(removed.begin(), removed.end(), i);
+  });
 }
 
 OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,

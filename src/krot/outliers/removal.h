@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -12,10 +13,77 @@
 #include "krot/convert/reprojection.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"
-#include "krot/outliers/conflict.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {
+
+// What the errors of observations are asked to stay within.
+struct ErrorBound {
+  Norm norm;             // p = 1, 2 or infinity
+  double max_error = 0;  // true pixels; > 0
+};
+
+// The work of decisions and proofs, in iterations of the joint solver times
+// observations, a few microseconds each. It is counted rather than timed, so
+// that a search that ends at its limit ends at the same place every time.
+struct Work {
+  int64_t done = 0;
+  int64_t limit = std::numeric_limits<int64_t>::max();
+
+  bool IsUsedUp() const { return done >= limit; }
+};
+
+// Whether some observations can be satisfied together: either an estimate at
+// which all their true errors are within the bound, or a support, some of them
+// that no estimate brings within it, as far as the linear rows tell. Neither
+// where the optimum is too near to the bound.
+struct Decision {
+  bool is_feasible = false;
+  bool is_refuted = false;
+  Estimate estimate;
+  std::vector<int64_t> support;  // if refuted; ascending
+};
+
+// Decides on all observations of `part`, which must be connected, in a few
+// rounds that solve the linear rows and take them anew at the solution. Starts
+// from part.start or, where a depth there is not positive, from nothing. Gives
+// up after a few hundred iterations. Adds to `*work`.
+Decision Decide(const Model& model, const BuiltProblem& part,
+                const ErrorBound& bound, const Context& context, Work* work);
+
+// Observations that no translations and points bring within a bound together,
+// so that at least one of them must go [Sim, Hartley 2006].
+struct Conflict {
+  std::vector<int64_t> observations;  // of the built problem, ascending
+  // In the built problem's numbers; empty before ProveConflict. Its support is
+  // `observations`.
+  PixelCertificate proof;
+  // Whether none of the observations can be spared: for each, an estimate was
+  // found that satisfies all others. Large conflicts are not tested.
+  bool is_irreducible = false;
+};
+
+// Finds a conflict among connected observations of `built` (ascending) and
+// makes it irreducible by deletion: an observation goes if the others are still
+// refuted. None if they can be satisfied together, or if nothing is decided.
+// The conflict is refuted as far as the linear rows tell, not proved yet. Takes
+// as many solves of the support as it has observations. Adds to `*work`.
+std::optional<Conflict> FindConflict(const Model& model,
+                                     const BuiltProblem& built,
+                                     const ErrorBound& bound,
+                                     const std::vector<int64_t>& observations,
+                                     const Context& context, Work* work);
+
+// Proves a conflict; observations that the proof does without are dropped.
+// False if there is no proof. With strong lenses this takes most of the time of
+// a conflict. Adds to `*work`.
+bool ProveConflict(const Model& model, const BuiltProblem& built,
+                   const ErrorBound& bound, const Context& context,
+                   Conflict* conflict, Work* work);
+
+// For each observation of a built problem its index among the model's track
+// elements. O(track elements).
+std::vector<uint64_t> ElementsOf(const Model& model, const BuiltProblem& built);
 
 // The observations that a slack programme looks at: those that come near the
 // bound, and enough others to tie their points and every frame. Its optimum is
@@ -46,9 +114,6 @@ struct Removal {
   std::vector<int64_t> observations;  // of the built problem, ascending
   // An estimate at which the true errors of all others are within the bound.
   Estimate estimate;
-  // The observations that influenced the slack programmes' solutions: conflicts
-  // are looked for among them. Ascending.
-  std::vector<int64_t> tight;
 };
 
 // Finds few observations to remove by the slack programme
@@ -93,7 +158,6 @@ class RemovalSearch {
   std::vector<double> errors_;  // there
   NearSet near_;
   std::vector<double> weights_;
-  std::vector<char> is_tight_;
 };
 
 // Where noise chose a bound for the errors at a start from nothing, the finish
@@ -233,7 +297,6 @@ struct ConflictPacking {
 //     others need least,
 //   in two others, then in all, among the observations there whose rays miss
 //     each other by most,
-//   and at last among the removal's tight observations,
 //
 // first among observations that are neither removed nor in a conflict, so that
 // removed ones do not share a conflict, then also among the removed ones that

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <numeric>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -12,8 +11,6 @@
 #include "krot/conic/interior_point.h"
 #include "krot/finish/least_squares.h"
 #include "krot/linear/reduced_camera_system.h"
-#include "krot/outliers/parts.h"
-#include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
@@ -34,10 +31,8 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
   const auto length = [&](int32_t k) {
     return problem.point_begin[k + 1] - problem.point_begin[k];
   };
-  std::vector<int32_t> longest_first(problem.num_points);
-  std::iota(longest_first.begin(), longest_first.end(), 0);
-  std::stable_sort(longest_first.begin(), longest_first.end(),
-                   [&](int32_t a, int32_t b) { return length(a) > length(b); });
+  std::vector<int32_t> longest_first = AllPoints(problem);
+  SortLargestFirst(&longest_first, length);
   std::vector<double> redundancy(problem.num_frames, 0);
   std::vector<int64_t> covering;
   for (const int32_t k : longest_first) {
@@ -68,18 +63,11 @@ std::vector<int64_t> ConnectedTracks(const KnownRotationProblem& problem) {
   }
 }
 
-Estimate AllAtZero(const KnownRotationProblem& problem) {
-  Estimate estimate;
-  estimate.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
-  estimate.points.resize(problem.num_points, Eigen::Vector3d::Zero());
-  return estimate;
-}
-
 // Solves the slack programme of some tracks, then places all other points.
 Estimate StartByProgramme(const KnownRotationProblem& problem,
                           const std::vector<int64_t>& tracks, Norm norm,
                           double level, const Context& context) {
-  Estimate estimate = AllAtZero(problem);
+  Estimate estimate = AllAtOrigin(problem);
   const ProblemSubset part(problem, tracks);
   Estimate own = part.Restrict(estimate);
   SlackOptions options;
@@ -115,7 +103,7 @@ class GrownStart {
         norm_(norm),
         level_(level),
         context_(context),
-        estimate_(AllAtZero(problem)),
+        estimate_(AllAtOrigin(problem)),
         is_frame_(problem.num_frames, 0),
         is_point_(problem.num_points, 0) {}
 
@@ -185,15 +173,7 @@ class GrownStart {
 
   // The observations by placed frames of points that two or more of them see.
   std::vector<int64_t> SeenTwice() const {
-    std::vector<int64_t> seen;
-    for (int32_t k = 0; k < problem_.num_points; ++k) {
-      const size_t before = seen.size();
-      for (const int64_t i : problem_.OfPoint(k)) {
-        if (is_frame_[problem_.FrameOf(i)]) seen.push_back(i);
-      }
-      if (seen.size() < before + 2) seen.resize(before);
-    }
-    return seen;
+    return SplitIntoParts(problem_, is_frame_)[1];
   }
 
   void MarkPoints(const ProblemSubset& placed) {
@@ -233,8 +213,9 @@ class GrownStart {
   const double level_;
   const Context& context_;
   Estimate estimate_;
-  std::vector<char> is_frame_, is_point_;  // placed
-  int32_t num_left_ = 0;                   // frames
+  std::vector<int32_t> is_frame_;  // placed: 1, otherwise 0
+  std::vector<char> is_point_;     // placed
+  int32_t num_left_ = 0;           // frames
 };
 
 // The start of a part whose frames are well tied.
@@ -263,7 +244,7 @@ std::optional<Estimate> StartOfParts(const KnownRotationProblem& problem,
   options.min_share = 0.2;
   const std::vector<int32_t> part_of = FindParts(problem, options);
   if (NumParts(part_of) == 1) return std::nullopt;
-  Estimate estimate = AllAtZero(problem);
+  Estimate estimate = AllAtOrigin(problem);
   PlaceParts(
       problem, part_of, norm, level, context,
       [&](const KnownRotationProblem& part, const Context& within,
@@ -307,7 +288,7 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
 
 Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
                          double level, const Context& context) {
-  Estimate estimate = AllAtZero(problem);
+  Estimate estimate = AllAtOrigin(problem);
   for (std::vector<int64_t>& component : SplitIntoComponents(problem)) {
     const ProblemSubset part(problem, std::move(component));
     part.Replace(StartOfComponent(part.problem(), norm, level, context),

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -13,7 +12,8 @@
 #include "krot/base/context.h"
 #include "krot/convert/reprojection.h"
 #include "krot/model/derived_models.h"
-#include "krot/outliers/conflict.h"
+#include "krot/model/rigs.h"
+#include "krot/outliers/removal.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"
 
@@ -115,10 +115,9 @@ class SnoopingFilter : private Filtering {
     ScaleObservations(Scales(built), &built);
     Removal removal;
     removal.estimate = built.start;
-    for (size_t i = 0; i < elements.size(); ++i) {
-      if (!is_removed_[elements[i]]) continue;
-      removal.observations.push_back(static_cast<int64_t>(i));
-    }
+    removal.observations = IndicesWhere(SignedSize(elements), [&](int64_t i) {
+      return is_removed_[elements[i]] != 0;
+    });
     const ErrorBound bound{Norm::L2(), summary.max_error_px};
     ConflictPacking packing =
         PackAgainstRemoval(model_, built, bound, removal, {}, context_);
@@ -134,14 +133,10 @@ class SnoopingFilter : private Filtering {
       built->start.translations[f] =
           kept_.model.frames[built->frame_of[f]].rig_from_world.translation;
     }
-    std::unordered_map<Point3DId, size_t> kept;
-    for (size_t k = 0; k < kept_.model.points3D.size(); ++k) {
-      kept.emplace(kept_.model.points3D[k].id, k);
-    }
+    const IdIndex<Point3DId> kept(kept_.model.points3D);
     for (size_t k = 0; k < built->point_of.size(); ++k) {
-      const auto found = kept.find(model_.points3D[built->point_of[k]].id);
-      if (found != kept.end())
-        built->start.points[k] = noise_.points[found->second];
+      const auto n = kept.Find(model_.points3D[built->point_of[k]].id);
+      if (n) built->start.points[k] = noise_.points[*n];
     }
   }
 
@@ -158,8 +153,7 @@ class SnoopingFilter : private Filtering {
         const View& view = problem.views[o.view];
         const AffineMap map =
             CamFromWorld(view, built.start.translations[view.frame]);
-        const Eigen::Vector3d x_cam =
-            map.leftCols<3>() * built.start.points[k] + map.col(3);
+        const Eigen::Vector3d x_cam = InCamera(map, built.start.points[k]);
         const double depth = o.E.row(0).dot(x_cam);
         const Eigen::Vector2d v = o.E.bottomRows<2>() * x_cam / depth;
         Eigen::Matrix<double, 2, 3> J =

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "krot/analysis/noise.h"
-#include "krot/base/disjoint_sets.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/convert/build_problem.h"
@@ -195,15 +194,14 @@ std::vector<FittedTrack> FitTracks(const Model& model, double max_error_px,
 int64_t RemoveNarrow(double min_angle_deg, Model* model) {
   const double least = std::cos(min_angle_deg / kDegreesPerRadian);
   const std::vector<ImageGeometry> geometries = ImageGeometries(*model);
-  const auto indices = ImageIndices(*model);
+  const std::vector<int32_t> image_of = ImagesOfElements(*model);
   std::vector<char> is_removed(model->track_elements.size(), 0);
   int64_t num_narrow = 0;
   for (const Point3D& point : model->points3D) {
     std::vector<Vector3d> rays;
     bool is_narrow = true;
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      const int32_t image = indices.at(model->track_elements[e].image_id);
-      const Vector3d center = Center(geometries[image].cam_from_world);
+      const Vector3d center = Center(geometries[image_of[e]].cam_from_world);
       rays.push_back((point.xyz - center).normalized());
       for (const Vector3d& other : rays) {
         is_narrow = is_narrow && other.dot(rays.back()) > least;
@@ -211,9 +209,8 @@ int64_t RemoveNarrow(double min_angle_deg, Model* model) {
     }
     if (!is_narrow) continue;
     ++num_narrow;
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      is_removed[e] = 1;
-    }
+    std::fill(is_removed.begin() + point.track_begin,
+              is_removed.begin() + point.track_end, 1);
   }
   *model = RemoveObservations(*model, is_removed).model;
   return num_narrow;

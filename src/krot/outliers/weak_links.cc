@@ -1,4 +1,3 @@
-#include "krot/outliers/parts.h"
 
 #include <algorithm>
 #include <cmath>
@@ -216,11 +215,10 @@ class Joiner {
     const size_t stride = std::max<size_t>(1, all.size() / 200);
     for (size_t n = 0; n < all.size(); n += stride) some.push_back(all[n]);
     const PlaceSearch tracks(problem_, estimate_, sigma_, std::move(some));
-    if (may_move_ && is_scale_free) {
-      if (const std::optional<Place> place = tracks.Propose()) {
-        Unite(pair, *place);
-        return link;
-      }
+    if (may_move_) {
+      Unite(pair, is_scale_free ? tracks.Propose().value_or(Place())
+                                : tracks.Profile({1}, context_)[0]);
+      return link;
     }
     const int num_steps =
         is_scale_free
@@ -236,30 +234,22 @@ class Joiner {
           context_);
       places.insert(places.begin(), fine.begin(), fine.end());
     }
-    if (!may_move_) {  // the estimate's own, which a search may miss
-      Place own;
-      own.cost = tracks.Cost(own);
-      places.push_back(own);
-    }
-    Place best = places[0];
-    for (const Place& place : places) {
-      if (place.cost < best.cost) best = place;
-    }
+    places.emplace_back();  // the estimate's own, which a search may miss
+    places.back().cost = tracks.Cost(places.back());
+    const Place best = *std::min_element(
+        places.begin(), places.end(),
+        [](const Place& x, const Place& y) { return x.cost < y.cost; });
     const PlaceSearch of_all(problem_, estimate_, sigma_, all);
     link.num_agreeing = of_all.NumAgreeing(best);
-    if (!may_move_) FindTurn(of_all, &link);
-    const double now = may_move_ ? best.scale : 1;
+    FindTurn(of_all, &link);
     for (const Place& place : places) {
       if (!(place.cost <= best.cost + tracks.no_worse())) continue;
-      const double factor = std::max(place.scale / now, now / place.scale);
+      const double factor = std::max(place.scale, 1 / place.scale);
       const bool is_last = factor * kScaleStep > kLargestScale;
       link.scale_factor =
           std::max(link.scale_factor, is_last ? kInfinity : factor);
     }
-    if (!std::isfinite(best.cost)) {  // no track says anything
-      best = Place();
-      link.scale_factor = kInfinity;
-    }
+    if (!std::isfinite(best.cost)) link.scale_factor = kInfinity;
     std::vector<int32_t> of_a, of_b;
     for (int32_t f = 0; f < problem_.num_frames; ++f) {
       if (group_of_[f] == pair.a) of_a.push_back(f);
@@ -267,10 +257,10 @@ class Joiner {
     }
     const bool is_b_smaller = of_b.size() <= of_a.size();
     link.frames = is_b_smaller ? of_b : of_a;
-    if (!may_move_ && !link.IsHeld()) {
+    if (!link.IsHeld()) {
       AskAllTracks(FramesOf(is_b_smaller ? pair.b : pair.a), &link);
     }
-    Unite(pair, best);
+    Unite(pair, Place());
     return link;
   }
 
@@ -345,13 +335,11 @@ class Joiner {
 
 }  // namespace
 
-std::vector<WeakLink> JoinParts(const KnownRotationProblem& problem,
-                                const std::vector<int32_t>& parts,
-                                const std::vector<int32_t>& point_part,
-                                double cap, const Context& context,
-                                Estimate* estimate) {
-  return Joiner(problem, parts, point_part, cap, /*may_move=*/true, context,
-                estimate)
+void JoinParts(const KnownRotationProblem& problem,
+               const std::vector<int32_t>& parts,
+               const std::vector<int32_t>& point_part, double cap,
+               const Context& context, Estimate* estimate) {
+  Joiner(problem, parts, point_part, cap, /*may_move=*/true, context, estimate)
       .Run();
 }
 

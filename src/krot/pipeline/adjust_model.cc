@@ -1,7 +1,6 @@
 #include "krot/pipeline/adjust_model.h"
 
 #include <cmath>
-#include <limits>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -71,8 +70,7 @@ std::optional<Model> BoundedStart(const Model& model,
   }
   if (context.IsCancelled() ||
       !IsBelow(summary->pixel_error_start,
-               summary->max_error.value_or(
-                   std::numeric_limits<double>::infinity()))) {
+               summary->max_error.value_or(kInfinity))) {
     return std::nullopt;
   }
   context.Note("largest error " + PixelText(summary->pixel_error_start.max) +

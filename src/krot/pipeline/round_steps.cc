@@ -18,13 +18,6 @@ namespace {
 using Eigen::Vector3d;
 using Basis = Eigen::Matrix<double, 2, 3>;
 
-Vector3d InCamera(const KnownRotationProblem& problem, const Estimate& estimate,
-                  const Observation& observation) {
-  const View& view = problem.views[observation.view];
-  const AffineMap map = CamFromWorld(view, estimate.translations[view.frame]);
-  return map.leftCols<3>() * estimate.points[observation.point] + map.col(3);
-}
-
 // Orthonormal basis of the plane across the ray of x_hat.
 Basis BasisAcross(const Vector3d& x_hat) {
   const Vector3d n = x_hat.normalized();
@@ -48,8 +41,8 @@ int64_t TrustRegions::Shrink(const Reprojection& reprojection,
         !(reprojection.Error(to, norm, i) > level))
       continue;
     const Observation& observation = problem.observations[i];
-    const Basis basis = BasisAcross(InCamera(problem, from, observation));
-    const Vector3d x_cam = InCamera(problem, to, observation);
+    const Basis basis = BasisAcross(reprojection.InCamera(from, i));
+    const Vector3d x_cam = reprojection.InCamera(to, i);
     const double way = (basis * x_cam).norm() / observation.E.row(0).dot(x_cam);
     const auto [entry, is_new] = radii_.emplace(i, way / 2);
     if (!is_new) entry->second = std::min(entry->second, way) / 2;
@@ -74,8 +67,12 @@ KnownRotationProblem TrustRegions::AddTo(
     for (auto bound = radii_.lower_bound(begin);
          bound != radii_.end() && bound->first < end; ++bound) {
       Observation row = rows.observations[bound->first];
+      const View& view = rows.views[row.view];
       row.E.bottomRows<2>() =
-          level / bound->second * BasisAcross(InCamera(rows, x_hat, row));
+          level / bound->second *
+          BasisAcross(
+              InCamera(CamFromWorld(view, x_hat.translations[view.frame]),
+                       x_hat.points[row.point]));
       problem.observations.push_back(row);
       observation_of->push_back(-1);
     }

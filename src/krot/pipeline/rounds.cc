@@ -35,7 +35,7 @@ class Rounds {
         positions_(model_, options_, context_, reprojection_, estimate_, built),
         cost_(LevelledCost(estimate_)),
         sufficient_cost_(SufficientCost(options_, method_)),
-        bounds_(options_.joint.relative_gap) {
+        bounds_{options_.joint.relative_gap} {
     if (positions_.Any()) {
       rows_options_.joint.relative_gap *= 0.05;
     }
@@ -77,7 +77,7 @@ class Rounds {
   }
 
   const std::optional<PixelCertificate>& certificate() const {
-    return bounds_.proof();
+    return bounds_.proof;
   }
 
  private:
@@ -171,10 +171,10 @@ class Rounds {
       round.linear_lower_bound = of_these->lower_bound;
     }
     if (!is_bound_near_) {
-      bounds_.SetRows(
-          of_these ? std::optional(RowsCertificate{*std::move(of_these),
-                                                   std::move(observation_of)})
-                   : std::nullopt);
+      bounds_.rows.reset();
+      if (of_these) {
+        bounds_.rows = {*std::move(of_these), std::move(observation_of)};
+      }
     }
     const double before = cost_;
     Estimate from = std::exchange(estimate_, Estimate());
@@ -227,9 +227,9 @@ class Rounds {
   }
 
   // Tries to prove a bound in true pixels from the last round's certificate of
-  // the rows, which is used up.
+  // the rows, which is used up: each is tried once.
   void Prove() {
-    const std::optional<RowsCertificate> rows = bounds_.UseRows();
+    const auto rows = std::exchange(bounds_.rows, std::nullopt);
     if (!rows) return;
     context_.Stage("proving the bound in true pixels");
     const double sufficient = bounds_.Sufficient(cost_);
@@ -245,11 +245,11 @@ class Rounds {
   // enough.
   bool TakeLevel(double optimum) {
     positions_.Keep(estimate_);
-    if (const auto& rows = bounds_.rows()) {
+    if (const auto& rows = bounds_.rows) {
       std::optional<PixelCertificate> refutation =
           positions_.Refute(estimate_, rows->certificate, SupportOf(*rows));
       if (refutation) {
-        bounds_.SetProof(std::move(refutation));
+        bounds_.proof = std::move(refutation);
         summary_.termination = SolveTermination::kInfeasible;
         return false;
       }

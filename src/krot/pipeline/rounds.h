@@ -24,56 +24,41 @@ namespace krot::internal {
 // The bounds that rounds have proved so far: in true pixels, and for the rows
 // that were solved last. Decides whether a true cost, in pixels, is near enough
 // to them.
-class RoundBounds {
- public:
-  // The gap asked for.
-  explicit RoundBounds(double relative_gap) : relative_gap_(relative_gap) {}
+struct RoundBounds {
+  const double relative_gap;  // asked for
+  std::optional<RowsCertificate> rows = {};
+  std::optional<PixelCertificate> proof = {};
 
-  const std::optional<RowsCertificate>& rows() const { return rows_; }
-  void SetRows(std::optional<RowsCertificate> rows) { rows_ = std::move(rows); }
-  // Hands out the rows' certificate for a proof in pixels and forgets it: each
-  // is tried once.
-  std::optional<RowsCertificate> UseRows() {
-    return std::exchange(rows_, std::nullopt);
-  }
-
-  const std::optional<PixelCertificate>& proof() const { return proof_; }
-  void SetProof(std::optional<PixelCertificate> proof) {
-    proof_ = std::move(proof);
-  }
-  void Improve(std::optional<PixelCertificate> proof) {
-    if (!proof) return;
-    if (!proof_ || proof->lower_bound > proof_->lower_bound) SetProof(proof);
+  void Improve(std::optional<PixelCertificate> other) {
+    if (!other) return;
+    if (!proof || other->lower_bound > proof->lower_bound) {
+      proof = std::move(other);
+    }
   }
 
   bool IsGapReached(double cost) const {
-    return proof_ && std::isfinite(cost) &&
-           cost - proof_->lower_bound <= relative_gap_ * cost;
+    return proof && std::isfinite(cost) &&
+           cost - proof->lower_bound <= relative_gap * cost;
   }
   // A bound that suffices for the gap at this cost. It leaves 5 % of the gap
   // for the rounding of later steps.
   double Sufficient(double cost) const {
-    return (1 - 0.95 * relative_gap_) * cost;
+    return (1 - 0.95 * relative_gap) * cost;
   }
   // Whether the cost is so near to the rows' bound that a proof in pixels may
   // reach the gap.
   bool IsWorthProving(double cost) const {
-    return rows_ &&
-           cost - rows_->certificate.lower_bound <= 3 * relative_gap_ * cost;
+    return rows &&
+           cost - rows->certificate.lower_bound <= 3 * relative_gap * cost;
   }
   // Whether the bound in pixels suffices for this cost, or the rows' bound is
   // so near to the cost that a proof in pixels, which gives a lower bound than
   // the rows, should suffice, too.
   bool IsNear(double cost) const {
-    return (proof_ && proof_->lower_bound >= Sufficient(cost)) ||
-           (rows_ &&
-            rows_->certificate.lower_bound >= (1 - 0.7 * relative_gap_) * cost);
+    return (proof && proof->lower_bound >= Sufficient(cost)) ||
+           (rows &&
+            rows->certificate.lower_bound >= (1 - 0.7 * relative_gap) * cost);
   }
-
- private:
-  const double relative_gap_;
-  std::optional<RowsCertificate> rows_;
-  std::optional<PixelCertificate> proof_;
 };
 
 // Bounds on how far the projections of single observations may move in one

@@ -38,13 +38,12 @@ double LargestShare(const IsGood& is_good) {
 // with all else fixed, then every point.
 class Settling {
  public:
-  Settling(const Model& model, const BuiltProblem& built,
-           const SettleOptions& options, const Context& context,
-           Estimate* estimate)
+  Settling(const Model& model, const BuiltProblem& built, Norm norm,
+           const Context& context, Estimate* estimate)
       : model_(model),
         built_(built),
         problem_(built.problem),
-        options_(options),
+        norm_(norm),
         context_(context),
         reprojection_(model, built),
         input_(OwnEstimate(model, built)),
@@ -61,8 +60,8 @@ class Settling {
     FindLooseFrames();
     is_held_frame_ = FindHeldFrames(problem_, built_.start, estimate_,
                                     is_loose_frame_, context_);
-    RestoreGaugeIfHarmless(problem_, built_.start, options_.norm, context_,
-                           &estimate_, &is_held_frame_);
+    RestoreGaugeIfHarmless(problem_, built_.start, norm_, context_, &estimate_,
+                           &is_held_frame_);
     std::vector<double> distances;
     for (int32_t f = 0; f < problem_.num_frames; ++f) {
       if (is_loose_frame_[f] == 0) continue;
@@ -136,9 +135,8 @@ class Settling {
   // and fitting the unknowns lowers the sum of squares by their share of its
   // degrees of freedom.
   void Measure() {
-    level_ = MaxOfRanks(
-        context_,
-        reprojection_.TrueCost(estimate_, options_.norm, context_.num_threads));
+    level_ = MaxOfRanks(context_, reprojection_.TrueCost(estimate_, norm_,
+                                                         context_.num_threads));
     squared_.assign(problem_.observations.size(), -1);
     ParallelForEach(static_cast<int64_t>(squared_.size()), context_.num_threads,
                     [&](int64_t i) {
@@ -167,9 +165,8 @@ class Settling {
   double Squared(int64_t i, double level) const {
     const double error = reprojection_.Error(estimate_, Norm::L2(), i);
     if (level < kInfinity &&
-        !((options_.norm.p == 2
-               ? error
-               : reprojection_.Error(estimate_, options_.norm, i)) <= level)) {
+        !((norm_.p == 2 ? error : reprojection_.Error(estimate_, norm_, i)) <=
+          level)) {
       return kInfinity;
     }
     return error * error;
@@ -339,7 +336,7 @@ class Settling {
       const View& view = problem_.views[o.view];
       const AffineMap camera =
           CamFromWorld(view, estimate_.translations[view.frame]);
-      centre -= camera.leftCols<3>().transpose() * camera.col(3);
+      centre += internal::CentreOf(camera);
       const Vector3d ray_in_camera = o.E.inverse().col(0);
       ray += camera.leftCols<3>().transpose() * ray_in_camera.normalized();
       limit += squared_[i];
@@ -370,7 +367,7 @@ class Settling {
   const Model& model_;
   const BuiltProblem& built_;
   const KnownRotationProblem& problem_;
-  const SettleOptions& options_;
+  const Norm norm_;
   const Context& context_;
   const Reprojection reprojection_;
   const Estimate input_;
@@ -389,10 +386,10 @@ class Settling {
 }  // namespace
 
 LooseParts SettleEstimate(const Model& model, const BuiltProblem& built,
-                          const SettleOptions& options, const Context& context,
+                          Norm norm, bool update_frames, const Context& context,
                           Estimate* estimate) {
-  Settling settling(model, built, options, context, estimate);
-  if (options.update_frames) settling.SettleFrames();
+  Settling settling(model, built, norm, context, estimate);
+  if (update_frames) settling.SettleFrames();
   settling.SettlePoints();
   return settling.Describe();
 }

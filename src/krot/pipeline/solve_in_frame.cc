@@ -312,9 +312,9 @@ SolveModelResult SolveInFrame(const Model& model,
         certificate ? std::optional(certificate->lower_bound) : std::nullopt,
         &start.built, &estimate, &summary);
   }
-  summary.loose = SettleEstimate(model, start.built,
-                                 {options.norm, options.res_int.update_frames},
-                                 context, &estimate);
+  summary.loose =
+      SettleEstimate(model, start.built, options.norm,
+                     options.res_int.update_frames, context, &estimate);
   PutFixed(start.built.problem, &estimate);
   summary.largest_position_ratio = LargestPositionRatio(start.built, estimate);
   const Reprojection reprojection(model, start.built);

@@ -8,13 +8,13 @@
 
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
-#include "krot/joint/working_set.h"
+#include "krot/joint/joint.h"
 #include "krot/linear/reduced_camera_system.h"
 #include "krot/model/derived_models.h"
 #include "krot/model/rigs.h"
 #include "krot/pipeline/stages.h"
-#include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
 namespace krot::internal {

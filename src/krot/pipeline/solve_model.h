@@ -91,20 +91,17 @@ struct LooseParts {
   bool have_moved = false;         // some frame or point was taken back
 };
 
-struct SettleOptions {
-  Norm norm;                  // of the largest error
-  bool update_frames = true;  // else frames stay where they are
-};
-
 // Gives the estimate of a problem that was built from `model` the place and
 // scale that the model's held frames have (gauge.h). Then moves frames and
 // points that are not determined towards where the model has them, as far as
 // the fit stays equally good: the largest error does not rise, and the sum of a
 // frame's or a point's squared errors rises by no more than noise explains.
+// Without `update_frames` frames stay where they are. `norm` is that of the
+// largest error.
 // Fixed ones stay, and so do frames and points with known positions. The same
 // bits at any number of threads and ranks. O(observations).
 LooseParts SettleEstimate(const Model& model, const BuiltProblem& built,
-                          const SettleOptions& options, const Context& context,
+                          Norm norm, bool update_frames, const Context& context,
                           Estimate* estimate);
 
 // The solve of a COLMAP model: lowers its largest reprojection error. `krot

@@ -65,11 +65,8 @@ bool HasOwnStart(const BuiltProblem& own);
 Start OwnStart(const Model& model, const SolveModelOptions& options,
                const Context& context);
 
-struct FoundStart {
+struct FoundStart : InitializerSummary {
   std::optional<Estimate> estimate;  // all depths are positive
-  // Why there is no estimate.
-  SolveTermination termination = SolveTermination::kNotRun;
-  std::optional<Certificate> certificate;  // if kInfeasible
 };
 
 // Looks for an estimate whose residuals are below options.init_max_error. Calls

@@ -145,25 +145,23 @@ FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
     log(iteration, state);
   };
   Estimate estimate;
-  InitializerSummary summary;
+  FoundStart start;
+  InitializerSummary& summary = start;
   RunStep(
       options.checkpoint, context,
       [&] { summary = FindStart(problem, initializer, context, &estimate); },
       [&](StepValues* values) {
         NameValues(values, &estimate);
-        values->Value(&summary.termination);
-        values->Values(&summary.iterations);
-        NameValues(values, &summary.certificate);
+        values->Value(&start.termination);
+        values->Values(&start.iterations);
+        NameValues(values, &start.certificate);
       });
-  for (; num_logged < summary.iterations.size(); ++num_logged) {
-    log(static_cast<int>(num_logged) + 1, summary.iterations[num_logged]);
+  for (; num_logged < start.iterations.size(); ++num_logged) {
+    log(static_cast<int>(num_logged) + 1, start.iterations[num_logged]);
   }
-  FoundStart start;
-  start.termination = summary.termination;
   if (start.termination == SolveTermination::kWithinBound) {
     start.estimate = std::move(estimate);
   }
-  start.certificate = std::move(summary.certificate);
   return start;
 }
 

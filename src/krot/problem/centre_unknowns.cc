@@ -1,4 +1,4 @@
-#include "krot/problem/centre_unknowns.h"
+#include "krot/problem/gauge.h"
 
 #include "krot/geometry.h"
 #include "krot/problem/subset.h"

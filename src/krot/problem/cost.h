@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -42,6 +43,16 @@ inline std::vector<AffineMap> CamerasFromWorld(
   return cameras;
 }
 
+inline Eigen::Vector3d InCamera(const AffineMap& camera,
+                                const Eigen::Vector3d& point) {
+  return camera.leftCols<3>() * point + camera.col(3);
+}
+
+// The camera's centre in the world.
+inline Eigen::Vector3d CentreOf(const AffineMap& camera) {
+  return -camera.leftCols<3>().transpose() * camera.col(3);
+}
+
 // The depth w and the v of an observation's residual ||v||_p / w.
 struct ViewedPoint {
   double depth;       // w, scene units
@@ -51,8 +62,7 @@ struct ViewedPoint {
 inline ViewedPoint ViewPoint(const AffineMap& camera,
                              const Observation& observation,
                              const Eigen::Vector3d& point) {
-  const Eigen::Vector3d x_cam = camera.leftCols<3>() * point + camera.col(3);
-  const Eigen::Vector3d wv = observation.E * x_cam;
+  const Eigen::Vector3d wv = observation.E * InCamera(camera, point);
   return {wv[0], wv.tail<2>()};
 }
 ViewedPoint ViewPoint(const KnownRotationProblem& problem,
@@ -81,13 +91,19 @@ double ResidualAbove(double level, const KnownRotationProblem& problem,
                      const std::vector<Eigen::Vector3d>& points, Norm norm,
                      int64_t begin, int64_t end);
 
-// The largest residual of a point, pixels; 0 if it has no observation.
-double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
-                 Norm norm, int64_t point);
-
-// The same for a frame.
-double FrameCost(const KnownRotationProblem& problem, const Estimate& estimate,
-                 Norm norm, int64_t frame);
+// The largest residual of some observations, pixels, as of OfPoint or OfFrame;
+// 0 if there are none.
+template <typename Indices>
+double CostOf(const KnownRotationProblem& problem, const Estimate& estimate,
+              Norm norm, const Indices& observations) {
+  double cost = 0;
+  for (const int64_t i : observations) {
+    cost = std::max(
+        cost, ResidualOf(ViewPoint(problem, problem.observations[i], estimate),
+                         norm));
+  }
+  return cost;
+}
 
 // max_i r_i in pixels [Zhang18, (KRot)]; 0 if there are no observations.
 // Throws std::invalid_argument unless p >= 1 and the estimate has one

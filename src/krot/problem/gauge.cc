@@ -171,10 +171,8 @@ std::vector<double> TypicalDistances(const KnownRotationProblem& problem,
   distances.reserve(problem.observations.size());
   frame_of.reserve(problem.observations.size());
   for (const Observation& o : problem.observations) {
-    const AffineMap& camera = cameras[o.view];
     distances.push_back(
-        (camera.leftCols<3>() * estimate.points[o.point] + camera.col(3))
-            .norm());
+        InCamera(cameras[o.view], estimate.points[o.point]).norm());
     frame_of.push_back(problem.views[o.view].frame);
   }
   return GroupMedians(distances, frame_of, problem.num_frames, context);

@@ -10,7 +10,6 @@
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/geometry.h"
 #include "krot/problem/cost.h"
 
 namespace krot::internal {
@@ -63,19 +62,14 @@ void CheckIndices(const KnownRotationProblem& problem) {
 
 using Eigen::Vector3d;
 
-Vector3d CentreOf(const View& view, const Vector3d& translation) {
-  return Center(
-      {view.cam_from_world_rotation, view.cam_from_rig_rotation * translation +
-                                         view.cam_from_rig_translation});
-}
-
 // Calls visit(x) for every fixed position in the world, views before points.
 template <typename Visit>
 void ForFixedPositions(const KnownRotationProblem& problem,
                        const Visit& visit) {
   for (const View& view : problem.views) {
     if (!problem.IsFixedFrame(view.frame)) continue;
-    visit(CentreOf(view, *problem.fixed_translations[view.frame]));
+    visit(
+        CentreOf(CamFromWorld(view, *problem.fixed_translations[view.frame])));
   }
   for (const std::optional<Vector3d>& x : problem.fixed_points) {
     if (x) visit(*x);
@@ -223,30 +217,6 @@ double ResidualAbove(double level, const KnownRotationProblem& problem,
     largest = std::max(largest, ResidualOf(viewed, norm));
   }
   return largest;
-}
-
-double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
-                 Norm norm, int64_t point) {
-  double cost = 0;
-  for (int64_t i = problem.point_begin[point];
-       i < problem.point_begin[point + 1]; ++i) {
-    const ViewedPoint viewed =
-        ViewPoint(problem, problem.observations[i], estimate);
-    cost = std::max(cost, ResidualOf(viewed, norm));
-  }
-  return cost;
-}
-
-double FrameCost(const KnownRotationProblem& problem, const Estimate& estimate,
-                 Norm norm, int64_t frame) {
-  double cost = 0;
-  for (int64_t n = problem.frame_begin[frame];
-       n < problem.frame_begin[frame + 1]; ++n) {
-    const ViewedPoint viewed = ViewPoint(
-        problem, problem.observations[problem.frame_observations[n]], estimate);
-    cost = std::max(cost, ResidualOf(viewed, norm));
-  }
-  return cost;
 }
 
 bool AllDepthsPositive(const KnownRotationProblem& problem,

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "krot/base/check.h"
-#include "krot/base/disjoint_sets.h"
 #include "krot/base/numbers.h"
 
 namespace krot::internal {

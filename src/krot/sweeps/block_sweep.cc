@@ -264,7 +264,7 @@ double BlockSweep::ResectFrame(int64_t f, FastDescent* descent,
   const int64_t end = problem_.frame_begin[f + 1];
   if (begin == end) return 0;
   if (problem_.IsFixedFrame(static_cast<int32_t>(f))) {
-    return FrameCost(problem_, *estimate, norm_, f);
+    return CostOf(problem_, *estimate, norm_, problem_.OfFrame(f));
   }
   const auto observation_of = [&](int64_t n) -> const Observation& {
     return problem_.observations[problem_.frame_observations[n]];

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <functional>
 
-#include "krot/joint/working_set.h"
+#include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
 #include "krot/sweeps/res_int.h"
 
@@ -142,14 +142,12 @@ class EndSearch {
   // Moves the frames outside of the usable part to where they fit in best.
   void PlaceOtherFrames(Estimate* estimate) const {
     const KnownRotationProblem& whole = shared_.problem();
-    std::vector<int64_t> theirs;
-    for (size_t n = 0; n < whole.observations.size(); ++n) {
-      const Observation& o = whole.observations[n];
-      if (usable_.FindPoint(o.point) && !usable_.FindView(o.view)) {
-        theirs.push_back(static_cast<int64_t>(n));
-      }
-    }
-    const ProblemSubset part(whole, std::move(theirs));
+    const auto is_theirs = [&](int64_t i) {
+      const Observation& o = whole.observations[i];
+      return usable_.FindPoint(o.point) && !usable_.FindView(o.view);
+    };
+    const ProblemSubset part(
+        whole, IndicesWhere(SignedSize(whole.observations), is_theirs));
     Estimate placed = part.Restrict(*estimate);
     BlockSweep(part.problem(), FastDescentOptions(), shared_.norm(), context_)
         .ResectFrames(&placed);

@@ -11,7 +11,7 @@
 #include "krot/base/context.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
-#include "krot/joint/working_set.h"
+#include "krot/joint/joint.h"
 #include "krot/linear/blocks.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"

@@ -179,19 +179,21 @@ std::vector<char> FindFar(const KnownRotationProblem& problem, Kind kind,
   std::vector<double> costs(count);
   const auto measure = [&] {
     for (int32_t n = 0; n < count; ++n) {
-      costs[n] = is_of_points ? PointCost(directions, estimate, norm, n)
-                              : FrameCost(directions, estimate, norm, n);
+      costs[n] =
+          is_of_points
+              ? CostOf(directions, estimate, norm, directions.OfPoint(n))
+              : CostOf(directions, estimate, norm, directions.OfFrame(n));
     }
   };
   measure();
-  std::vector<int64_t> undecided;
-  for (size_t n = 0; n < directions.observations.size(); ++n) {
-    const auto i = static_cast<int64_t>(n);
-    const double cost = costs[is_of_points ? directions.observations[n].point
+  const auto is_undecided = [&](int64_t i) {
+    const double cost = costs[is_of_points ? directions.observations[i].point
                                            : directions.FrameOf(i)];
-    if (cost >= bound && std::isfinite(cost)) undecided.push_back(i);
-  }
-  const ProblemSubset part(directions, std::move(undecided));
+    return cost >= bound && std::isfinite(cost);
+  };
+  const ProblemSubset part(
+      directions,
+      IndicesWhere(SignedSize(directions.observations), is_undecided));
   Estimate lowered = part.Restrict(estimate);
   BlockSweep sweep(part.problem(), FastDescentOptions(), norm, context);
   if (is_of_points) {
@@ -306,11 +308,10 @@ ToleranceProblem::ToleranceProblem(const Model& model, BuiltProblem* built,
     if (!(ResidualOf(viewed, norm) < bound)) has_row_[i] = 0;
   }
   num_rowless_ = std::count(has_row_.begin(), has_row_.end(), char{0});
-  std::vector<int64_t> with_row;
-  for (size_t i = 0; i < has_row_.size(); ++i) {
-    if (has_row_[i]) with_row.push_back(static_cast<int64_t>(i));
-  }
-  far_ = FindFarParts(problem, std::move(with_row), norm, bound, context);
+  far_ = FindFarParts(problem,
+                      IndicesWhere(SignedSize(has_row_),
+                                   [&](int64_t i) { return has_row_[i]; }),
+                      norm, bound, context);
   num_far_points_ = std::count(far_.points.begin(), far_.points.end(), char{1});
 }
 
@@ -327,16 +328,13 @@ std::optional<ProblemSubset> ToleranceProblem::UsablePart(
       }
     }
   }
-  std::vector<int64_t> usable;
-  for (size_t i = 0; i < whole.observations.size(); ++i) {
-    const auto n = static_cast<int64_t>(i);
-    if (!has_row_[i] || far.points[whole.observations[i].point] ||
-        far.frames[whole.FrameOf(n)]) {
-      continue;
-    }
-    usable.push_back(n);
-  }
-  ProblemSubset part(whole, HeldObservations(whole, std::move(usable)));
+  const auto is_usable = [&](int64_t i) {
+    return has_row_[i] && !far.points[whole.observations[i].point] &&
+           !far.frames[whole.FrameOf(i)];
+  };
+  ProblemSubset part(
+      whole,
+      HeldObservations(whole, IndicesWhere(SignedSize(has_row_), is_usable)));
   for (const Pull& target : targets) {
     if (!InPart(part, target) && !IsFixedPosition(whole, target)) {
       return std::nullopt;
