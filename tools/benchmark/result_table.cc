@@ -50,9 +50,13 @@ Cell ScientificCell(double value) {
 Cell MissingCell(const std::string& why) { return {nullptr, why}; }
 
 std::string ToText(const ResultTable& table) {
-  TextTable text;
-  text.AddRow(table.columns);
-  for (const std::vector<Cell>& row : table.rows) text.AddRow(Texts(row));
+  const auto row_of = [](const std::vector<std::string>& texts) {
+    return Row(texts.begin(), texts.end());
+  };
+  TextTable text(row_of(table.columns));
+  for (const std::vector<Cell>& row : table.rows) {
+    text.AddRow(row_of(Texts(row)));
+  }
   std::string result = table.caption + "\n" + text.ToString();
   for (const std::string& note : table.notes) result += "  " + note + "\n";
   return result;
