@@ -2,6 +2,7 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "krot/context.h"
@@ -17,9 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 
 // Throws if something is not as it is in a valid model that agrees with itself.
-// What it is, reading the whole model tells.
+// What it is, reading the whole model tells: nobody reads this sentence.
 void Require(bool is_as_expected) {
-  if (!is_as_expected) throw ModelError("the model is not valid");
+  if (!is_as_expected) throw ModelError(std::string());
 }
 
 // Reads images without 2D points, and where these begin in the file.
