@@ -2,6 +2,7 @@
 
 #include "krot/analysis/model_input.h"
 #include "krot/model/model_io.h"
+#include "krot/report/reports.h"
 
 namespace krot::internal {
 namespace {
