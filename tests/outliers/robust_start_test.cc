@@ -13,6 +13,7 @@
 #include "krot/analysis/model_comparison.h"
 #include "krot/model/rigs.h"
 #include "krot/outliers/outlier_filter.h"
+#include "krot/outliers/parts.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/scene_of.h"
@@ -153,6 +154,20 @@ TEST(FindParts, CutsWhereFewTracksCross) {
     ASSERT_EQ(parts.size(), 24u);
     for (int n = 0; n < 24; ++n) EXPECT_EQ(parts[n], ties.part_of(n)) << n;
   }
+}
+
+// A dozen images that see all around, and four groups of three that see them.
+TEST(FindParts, TakeAllSmallerGroupsThatManyTracksTie) {
+  const auto part_of = [](int n) { return n % 2 == 0 ? 0 : 1 + n / 2 % 4; };
+  const auto parts_with = [&](int num_tracks) {
+    return NumParts(FindParts(
+        ProblemOf(WeaklyTied(
+            SynthesizeScene(SceneInParts(SceneLayout::kOrbit)).model, part_of,
+            [](int a, int) { return a == 0; }, num_tracks, /*num_wrong=*/0)),
+        {}));
+  };
+  EXPECT_EQ(parts_with(10), 5);
+  EXPECT_EQ(parts_with(200), 1);
 }
 
 // The scales of both parts are free, if it were not for a few tracks, which may

@@ -8,6 +8,7 @@
 #include "krot/base/context.h"
 #include "krot/base/numbers.h"
 #include "krot/model/derived_models.h"
+#include "krot/outliers/parts.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/gauge.h"

@@ -1,4 +1,4 @@
-#include "krot/outliers/robust_start.h"
+#include "krot/outliers/parts.h"
 
 #include <algorithm>
 #include <tuple>

@@ -11,7 +11,7 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/geometry/transform.h"
-#include "krot/outliers/robust_start.h"
+#include "krot/outliers/parts.h"
 
 namespace krot::internal {
 namespace {

@@ -13,6 +13,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/convert/build_problem.h"
 #include "krot/finish/least_squares.h"
+#include "krot/outliers/parts.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"

@@ -11,6 +11,7 @@
 #include "krot/conic/interior_point.h"
 #include "krot/finish/least_squares.h"
 #include "krot/linear/reduced_camera_system.h"
+#include "krot/outliers/parts.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"

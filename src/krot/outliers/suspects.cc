@@ -20,7 +20,6 @@
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 #include "krot/outliers/removal.h"
-#include "krot/outliers/robust_start.h"
 
 namespace krot::internal {
 namespace {

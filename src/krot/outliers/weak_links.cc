@@ -1,3 +1,4 @@
+#include "krot/outliers/parts.h"
 
 #include <algorithm>
 #include <cmath>
