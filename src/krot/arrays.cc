@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "krot/base/check.h"
+#include "krot/geometry.h"
 #include "krot/joint/joint.h"
 #include "krot/known_rotation.h"
-#include "krot/math/norm.h"
 #include "krot/minimax.h"
 #include "krot/minimax/fast_descent.h"
 #include "krot/problem/known_rotation_problem.h"

@@ -102,6 +102,50 @@ struct ModelNoise {
 ModelNoise EstimateNoise(const Model& model, const NoiseOptions& options = {},
                          const Context& context = {});
 
+// ---- Conventions ----
+
+// How a model's numbers differ from COLMAP's, because they come from a program
+// that writes the same things otherwise. The default is COLMAP's own way:
+// cam_from_world with w first, camera axes x right, y down, z forward.
+struct Conventions {
+  bool has_w_last = false;         // quaternions are x, y, z, w
+  bool is_world_from_cam = false;  // rotations take camera to world
+  bool has_centers = false;        // translations are the cameras' centres
+  bool is_left_handed = false;     // the axes of world and cameras are
+  // Takes the file's camera axes to COLMAP's; if they are left-handed, once
+  // their y has been turned round.
+  Eigen::Matrix3d cam_from_file_axes = Eigen::Matrix3d::Identity();
+  // What focal lengths, principal points and image sizes must be multiplied by,
+  // as they are those of photos of another size than the 2D points.
+  double intrinsics_factor = 1;
+  bool has_central_principal_point = false;  // though the file says otherwise
+  // The 3D points are not where their images see them.
+  bool has_wrong_points = false;
+
+  // Median reprojection errors of a sample of the model's tracks, pixels: as it
+  // stands, and so converted, with points where their images see them. No error
+  // counts more than the size of the photo.
+  double median_error_as_read_px = 0;
+  double median_error_px = 0;
+
+  bool HasOtherPoses() const;
+};
+
+// The simplest conventions under which the model's tracks, or the matches of a
+// database if it has none, fit: their median error falls to a quarter or less
+// of what it is as COLMAP reads the model, and to a hundredth or less of the
+// photo's size. None for a model whose median error is within the 4 px to which
+// COLMAP's mapper filters, or that fits no other way. Poses of rigs with
+// several sensors are taken as they are. Requires a valid model. Milliseconds
+// for a sound model, up to a second otherwise.
+std::optional<Conventions> FindConventions(const Model& model,
+                                           const Database* database = nullptr,
+                                           const Context& context = {});
+
+// The model in COLMAP's conventions. `from` must come from FindConventions.
+Model ConvertModel(const Model& model, const Conventions& from,
+                   const Context& context = {});
+
 // ---- Verdicts ----
 
 enum class ImageVerdict {
@@ -231,6 +275,9 @@ struct ModelCheckOptions {
 };
 
 struct ModelCheck {
+  // If the model is not in COLMAP's conventions, everything else here is about
+  // the converted one.
+  std::optional<Conventions> conventions;
   std::optional<PairCheck> pairs;  // with a database
   // Standard deviation of the noise per axis, pixels; with keypoint scales, for
   // the median scale. None if no observation is checked by another one, as in a
@@ -261,21 +308,22 @@ struct ModelCheck {
 
   int64_t NumImages(ImageVerdict verdict) const;
   bool IsAnythingWrong() const {
-    return !observations.empty() || !cameras.empty() ||
+    return conventions || !observations.empty() || !cameras.empty() ||
            NumImages(ImageVerdict::kWrong) > 0 ||
            (pairs && pairs->IsAnythingWrong());
   }
 };
 
 // Finds what is wrong in a model; docs/method/outliers.md describes the tests.
-// First it compares the database's matches with the poses. Then it leaves out
-// the images that these call wrong and snoops: in each track the observation
-// with the largest w is removed, until none is above the critical value. The
-// image with the strongest evidence against it is called wrong if one of the
-// tests of ImageFault says so; over all images of a sound model the probability
-// of that is false_alarm. All this is repeated without the image until none is
-// wrong, so that no image is blamed for its neighbour. Requires a valid model.
-// The same bits at any number of threads.
+// A model in other conventions is converted to COLMAP's. Then it compares the
+// database's matches with the poses, leaves out the images that these call
+// wrong and snoops: in each track the observation with the largest w is
+// removed, until none is above the critical value. The image with the strongest
+// evidence against it is called wrong if one of the tests of ImageFault says
+// so; over all images of a sound model the probability of that is false_alarm.
+// All this is repeated without the image until none is wrong, so that no image
+// is blamed for its neighbour. Requires a valid model. The same bits at any
+// number of threads.
 ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options = {},
                       const Context& context = {});
 
@@ -284,14 +332,14 @@ struct ModelCure {
   std::vector<std::string> moved;  // names of the images that were moved
 };
 
-// A copy without wrong observations and images. If only the position of an
-// image is wrong, according to its matches, it is moved to where these fit best
-// (CheckedImage::moved_cam_from_world) and kept, unless something calls it
-// wrong there as well. Images that share their frame with others are not moved,
-// as these would move along. All other cameras stay. Points that lose
-// observations move to the least squares of the rest; stored errors are
-// updated. A bitwise copy if nothing is wrong. `check` must come from
-// CheckModel with these options.
+// A copy in COLMAP's conventions without wrong observations and images. If only
+// the position of an image is wrong, according to its matches, it is moved to
+// where these fit best (CheckedImage::moved_cam_from_world) and kept, unless
+// something calls it wrong there as well. Images that share their frame with
+// others are not moved, as these would move along. All other cameras stay.
+// Points that lose observations move to the least squares of the rest; stored
+// errors are updated. A bitwise copy if nothing is wrong. `check` must come
+// from CheckModel with these options.
 ModelCure CureModel(const Model& model, const ModelCheck& check,
                     const ModelCheckOptions& options = {},
                     const Context& context = {});

@@ -111,4 +111,11 @@ inline double NormOf(const Eigen::Vector2d& v, Norm norm) {
                             1 / norm.p);
 }
 
+// The norm dual to ||.||_p; p = 1, 2 or infinity.
+template <typename Real>
+Real DualNorm(const Eigen::Matrix<Real, 2, 1>& y, Norm norm) {
+  if (norm.p == 1) return y.cwiseAbs().maxCoeff();
+  return norm.p == 2 ? y.norm() : y.cwiseAbs().sum();
+}
+
 }  // namespace krot

@@ -64,6 +64,38 @@ TEST_F(ModelCheckerCommand, SaysFirstThatNothingIsWrong) {
   EXPECT_THAT(result.out, StartsWith("Nothing is wrong: all "));
 }
 
+// The inverse poses, in OpenGL's axes, as programs for radiance fields have.
+TEST_F(ModelCheckerCommand, ConvertsAModelThatIsNotInColmapsConventions) {
+  Model model = Load(folder_ / "sound");
+  for (Frame& frame : model.frames) {
+    RigidTransform inverse = Inverse(frame.rig_from_world.Transform());
+    inverse.rotation.rightCols<2>() *= -1;
+    frame.rig_from_world = ToPose(inverse);
+  }
+  Save(model, folder_ / "gl");
+  const KrotResult result = Succeeded(
+      Check("gl", {"--output_path", folder_ / "cured", "--report_path",
+                   folder_ / "r.json", "--html_path", folder_ / "r.html"}));
+  EXPECT_THAT(
+      result.out,
+      StartsWith("The model is not in COLMAP's conventions, but has "
+                 "poses from camera to world, camera axes (x right, y "
+                 "up, z backward): converted, its median error falls "));
+  EXPECT_THAT(result.out, HasSubstr("Once converted: Nothing is wrong: all "));
+  const Json report = ReadJson(folder_ / "r.json");
+  EXPECT_TRUE(report["is_anything_wrong"]);
+  EXPECT_EQ(report["conventions"]["camera_axes"], "x right, y up, z backward");
+  const PixelErrorStatistics errors =
+      Summarize(PixelErrors(Load(folder_ / "cured")));
+  const double sound = Summarize(PixelErrors(Load(folder_ / "sound"))).max;
+  EXPECT_NEAR(errors.max, sound, 1e-6);
+
+  EXPECT_THAT(Succeeded(RunKrot({"solver", "--input_path", folder_ / "gl",
+                                 "--output_path", folder_ / "solved"}))
+                  .err,
+              HasSubstr("is not in COLMAP's conventions, but has poses"));
+}
+
 TEST_F(ModelCheckerCommand, NamesWhatIsWrongAndWritesTheModelWithout) {
   const KrotResult result = Succeeded(
       Check("faulty", {"--output_path", folder_ / "cured", "--report_path",

@@ -198,6 +198,21 @@ TEST(Database, IsRefusedIfTheModelWasMadeFromOtherFeatures) {
               HasSubstr("expected the database that the model was made from"));
 }
 
+TEST(Database, IsRefusedWithTheOtherNameIfNamesAreExchanged) {
+  const TempFolder folder;
+  {
+    DatabaseWriter writer(folder / "database.db");
+    WriteImages(&writer);
+    writer.AddImage(6, "c.jpg", {{10, 20}, {40, 50}});
+  }
+  Model model = ThreeImages();
+  model.images[0].points2D = {{10, 20, 7}, {40, 50, 7}};
+  model.images[2].points2D = {{2, 3, 7}, {28, 4, 7}, {5, 66, 7}};
+  EXPECT_THAT(DatabaseError(folder / "database.db", model),
+              HasSubstr("keypoints of image \"a.jpg\": found the 2D points of "
+                        "the model's image \"c.jpg\", expected its own"));
+}
+
 TEST(Database, IsRefusedWithOneSentenceIfItIsNone) {
   const TempFolder folder;
   const fs::path path = folder / "database.db";

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/minimax/residual_set.h"
 
 namespace krot::internal {

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {

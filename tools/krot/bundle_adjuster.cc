@@ -111,6 +111,7 @@ int Run(const ModelPaths& paths, const std::string& check_points_path,
   report.run.seed = common.random_seed;
 
   Model model = ReadInput(paths, common.log, &report.run);
+  WarnOfConventions(paths, model, common.log);
   options.adjustment.fixed = ReadFixedParts(paths, model, common.log);
   const Survey survey(ReadKnownPositions(paths, model, common.log),
                       paths.output_frame == "own", &model);

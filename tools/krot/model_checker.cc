@@ -116,7 +116,9 @@ void WriteViews(const CheckerCommand& command, const CheckReport& report,
   }
   std::string crops = "[]";
   if (!command.image_path.empty()) {
-    Model moved = model;
+    Model moved = report.check.conventions
+                      ? ConvertModel(model, *report.check.conventions)
+                      : model;
     for (size_t k = 0; k < moved.points3D.size(); ++k) {
       moved.points3D[k].xyz = report.check.points[k];
     }

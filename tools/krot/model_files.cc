@@ -11,9 +11,11 @@
 #include "krot/analysis/model_input.h"
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"
+#include "krot/check.h"
 #include "krot/context.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"
+#include "krot/report/reports.h"
 #include "krot/report/sentences.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/report_files.h"
@@ -284,6 +286,17 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
   }
   run->seconds_read = timer.Seconds();
   return std::move(read.model);
+}
+
+void WarnOfConventions(const ModelPaths& paths, const Model& model,
+                       const LogOptions& log) {
+  if (!paths.rotations_path.empty()) return;
+  const auto conventions = FindConventions(model);
+  if (!conventions) return;
+  LogLine(log, 0,
+          "warning: " + paths.input_path + ": " +
+              ConventionsSentence(*conventions) +
+              " krot model_checker --output_path writes it so");
 }
 
 void WriteOutput(const Model& model, const ModelPaths& paths,

@@ -97,6 +97,11 @@ PoseChecks DescribeInput(const std::string& path, const Model& model,
 Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
                 bool needs_observations = true);
 
+// Warns on stderr if the model is not in COLMAP's conventions, unless rotations
+// of paths.rotations_path have replaced its own.
+void WarnOfConventions(const ModelPaths& paths, const Model& model,
+                       const LogOptions& log);
+
 // Writes the model to paths.output_path, and to `run` how long that took.
 void WriteOutput(const Model& model, const ModelPaths& paths,
                  const WriteModelOptions& options, const LogOptions& log,

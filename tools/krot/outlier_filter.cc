@@ -152,6 +152,7 @@ int Run(const OutlierCommand& command) {
   report.run.seed = command.common.random_seed;
 
   const Model model = ReadInput(paths, log, &report.run);
+  WarnOfConventions(paths, model, log);
   OutlierFilterResult result = Filter(command, model);
   DeferInterrupts();
   report.summary = std::move(result.summary);

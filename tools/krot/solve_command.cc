@@ -324,6 +324,7 @@ int RunSolveCommand(const SolveCommand& command) {
   if (has_database) {
     model = PlaceByMatches(command, model, &report, &seconds_placed);
   }
+  if (!has_database) WarnOfConventions(paths, model, log);
   report.distances = ReadKnownDistances(paths, model, log);
   const std::unique_ptr<Checkpoint> checkpoint =
       OpenCheckpoint(command.checkpoint, paths, model, command.context, log);

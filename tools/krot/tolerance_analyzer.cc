@@ -129,6 +129,7 @@ int Run(const ToleranceCommand& command) {
   ToleranceReport report;
   report.run.seed = command.common.random_seed;
   const Model model = ReadInput(paths, log, &report.run);
+  WarnOfConventions(paths, model, log);
   ToleranceResult result = Analyze(command, model);
   DeferInterrupts();
   report.summary = std::move(result.summary);

@@ -257,7 +257,7 @@ Model Removed(const Model& model, const ModelCheck& check,
   Model moved = model;
   for (size_t k = 0; k < model.points3D.size(); ++k) {
     const Point3D& point = model.points3D[k];
-    bool is_any = false;
+    bool is_any = check.conventions && check.conventions->has_wrong_points;
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
       is_removed[e] |= is_wrong_image[image_of[e]];
       is_any |= is_removed[e];
@@ -274,11 +274,14 @@ Model Removed(const Model& model, const ModelCheck& check,
 
 ModelCure CureModel(const Model& model, const ModelCheck& check,
                     const ModelCheckOptions& options, const Context& context) {
-  Model moved = model;
+  Model moved = check.conventions
+                    ? ConvertModel(model, *check.conventions, context)
+                    : model;
   if (!check.pairs || !MoveImages(*check.pairs, &moved)) {
-    return {Removed(model, check, context), {}};
+    return {Removed(moved, check, context), {}};
   }
-  const ModelCheck again = CheckModel(moved, options, context);
+  ModelCheck again = CheckModel(moved, options, context);
+  again.conventions = check.conventions;
   ModelCure cure = {Removed(moved, again, context), {}};
   for (size_t n = 0; n < check.images.size(); ++n) {
     if (check.pairs->images[n].is_wrong &&

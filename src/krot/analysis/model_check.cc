@@ -44,9 +44,8 @@ class Checker {
   }
 
   ModelCheck Run() {
-    for (const Point3D& point : model_.points3D) {
+    for (const Point3D& point : model_.points3D)
       check_.points.push_back(point.xyz);
-    }
     if (options_.database != nullptr) AskMatches();
     bool judges_cameras = true;
     do {
@@ -390,7 +389,12 @@ int64_t ModelCheck::NumImages(ImageVerdict verdict) const {
 
 ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
                       const Context& context) {
-  return Checker(model, options, context).Run();
+  const auto conventions = FindConventions(model, options.database, context);
+  if (!conventions) return Checker(model, options, context).Run();
+  const Model converted = ConvertModel(model, *conventions, context);
+  ModelCheck check = Checker(converted, options, context).Run();
+  check.conventions = conventions;
+  return check;
 }
 
 }  // namespace krot

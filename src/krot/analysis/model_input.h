@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "krot/geometry.h"
-#include "krot/math/norm.h"
 #include "krot/model.h"
 #include "krot/model/model_checks.h"
 #include "krot/model/model_io.h"

@@ -11,7 +11,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/camera/interval.h"
 #include "krot/camera/models.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 
 namespace krot::internal {
 namespace {

@@ -5,9 +5,16 @@
 
 #include <Eigen/Core>
 
-#include "krot/math/norm.h"
+#include "krot/base/check.h"
+#include "krot/geometry.h"
 
 namespace krot::internal {
+
+// Throws std::invalid_argument unless there are cones for the norm.
+inline void CheckConic(Norm norm) {
+  CheckArgument(norm.p == 2 || norm.IsPolyhedral(), "norm.p", norm.p,
+                "1, 2 or infinity");
+}
 
 // The symmetric cones of one observation and their Jordan algebras
 // [Alizadeh, Goldfarb 2003]: for p = 2 the second-order cone ||v|| <= gamma w

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "krot/base/check.h"
+#include "krot/conic/cones.h"
 #include "krot/conic/newton_system.h"
 #include "krot/conic/path_following.h"
 #include "krot/problem/known_rotation_problem.h"

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "krot/base/context.h"
+#include "krot/geometry.h"
 #include "krot/linear/blocks.h"
-#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {

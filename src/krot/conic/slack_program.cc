@@ -8,6 +8,7 @@
 
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
+#include "krot/conic/cones.h"
 #include "krot/conic/path_following.h"
 
 namespace krot::internal {

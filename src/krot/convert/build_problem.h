@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 
 #include "krot/base/context.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"
 #include "krot/model/rigs.h"

@@ -14,7 +14,7 @@
 #include "krot/convert/build_problem.h"
 #include "krot/convert/pixel_certificate.h"
 #include "krot/database.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"
 #include "krot/solve.h"

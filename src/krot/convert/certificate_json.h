@@ -10,7 +10,7 @@
 
 #include "krot/context.h"
 #include "krot/convert/certificate_file.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 
 namespace krot::internal {
 

@@ -8,7 +8,7 @@
 
 #include "krot/base/context.h"
 #include "krot/convert/build_problem.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/model.h"
 #include "krot/verify/certificate_check.h"
 

@@ -7,7 +7,7 @@
 
 #include "krot/camera/camera_model.h"
 #include "krot/convert/build_problem.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 #include "krot/problem/known_rotation_problem.h"

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "krot/base/check.h"
+#include "krot/conic/cones.h"
 #include "krot/conic/path_following.h"
 #include "krot/finish/bounded_system.h"
 #include "krot/problem/cost.h"

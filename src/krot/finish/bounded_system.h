@@ -8,9 +8,9 @@
 #include <Eigen/Core>
 
 #include "krot/finish/least_squares.h"
+#include "krot/geometry.h"
 #include "krot/linear/ordered_sums.h"
 #include "krot/linear/schur_complement.h"
-#include "krot/math/norm.h"
 #include "krot/problem/gauge.h"
 
 namespace krot::internal {

@@ -7,7 +7,7 @@
 
 #include "krot/base/context.h"
 #include "krot/conic/interior_point.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {

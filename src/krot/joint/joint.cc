@@ -8,6 +8,7 @@
 
 #include "krot/base/check.h"
 #include "krot/base/context.h"
+#include "krot/conic/cones.h"
 #include "krot/joint/component_solve.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"

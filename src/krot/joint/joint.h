@@ -8,7 +8,7 @@
 #include "krot/base/checkpoint.h"
 #include "krot/base/context.h"
 #include "krot/conic/interior_point.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"

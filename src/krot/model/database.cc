@@ -156,6 +156,13 @@ void ReadKeypoints(const Model& model, const ImageOfId& join,
             ScaleOf(&elements[i * columns], columns));
       }
     } else if (!AreAmong(keypoints, image.points2D)) {
+      for (const Image& other : model.images) {
+        if (!AreSameFeatures(keypoints, other.points2D)) continue;
+        database->Fail(where + ": found the 2D points of the model's image \"" +
+                       other.name +
+                       "\", expected its own; give the model's images the "
+                       "names of their photos");
+      }
       database->Fail(where + ": found " + std::to_string(count) +
                      " keypoints that are not the model's " +
                      std::to_string(image.points2D.size()) +

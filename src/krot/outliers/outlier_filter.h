@@ -13,7 +13,7 @@
 #include "krot/convert/build_problem.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/convert/pixel_certificate.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/model.h"
 #include "krot/model/derived_models.h"
 #include "krot/outliers.h"

@@ -10,7 +10,7 @@
 
 #include "krot/base/context.h"
 #include "krot/base/numbers.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 

@@ -11,7 +11,7 @@
 #include "krot/convert/build_problem.h"
 #include "krot/convert/pixel_certificate.h"
 #include "krot/convert/reprojection.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/model.h"
 #include "krot/problem/known_rotation_problem.h"
 

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "krot/base/numbers.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/minimax/kernels.h"
 #include "krot/minimax/residual_set.h"
 #include "krot/problem/known_rotation_problem.h"

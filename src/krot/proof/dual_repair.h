@@ -11,8 +11,8 @@
 #include <Eigen/QR>
 
 #include "krot/conic/interior_point.h"
+#include "krot/geometry.h"
 #include "krot/linear/schur_complement.h"
-#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/verify/certificate_check.h"
 

@@ -122,6 +122,17 @@ std::string NextSteps(const CheckReport& report) {
   const std::string cured = or_name(report.output_path, "CURED");
   const std::string database = or_name(report.database_path, "DATABASE");
   std::string text = "\nNext\n";
+  const bool is_converted = check.conventions.has_value();
+  if (report.output_path.empty() &&
+      (is_converted || (check.is_adjusted && check.IsAnythingWrong()))) {
+    text +=
+        (is_converted ? "  The model in COLMAP's conventions, without what is "
+                        "wrong:\n"
+                      : "  The model without what is wrong:\n") +
+        ("    krot model_checker --input_path " + input) +
+        (report.database_path.empty() ? "" : " --database_path " + database) +
+        " --output_path " + cured + "\n";
+  }
   if (!check.is_adjusted) {
     const bool is_center_held =
         std::any_of(check.cameras.begin(), check.cameras.end(),
@@ -134,20 +145,12 @@ std::string NextSteps(const CheckReport& report) {
            "and "
            "check it again:\n" +
            RobustAdjustment(
-               input, check.cauchy_scale_px.value_or(1),
+               is_converted ? cured : input, check.cauchy_scale_px.value_or(1),
                TextIf(is_center_held,
                       " --BundleAdjustment.refine_principal_point 1")) +
            "    krot model_checker --input_path ADJUSTED\n";
   }
   std::string model = check.IsAnythingWrong() ? cured : input;
-  if (check.IsAnythingWrong() && report.output_path.empty()) {
-    text +=
-        "  The model without what is wrong:\n    krot model_checker "
-        "--input_path " +
-        input +
-        (report.database_path.empty() ? "" : " --database_path " + database) +
-        " --output_path " + cured + "\n";
-  }
   if (!report.moved.empty()) {
     text += "  In it " +
             Counted(report.moved.size(), "wrong image", "has", "have") +
@@ -302,7 +305,9 @@ std::string ForAdjusted(const CheckReport& report) {
 
 }  // namespace
 
-std::string CheckSentence(const CheckReport& report) {
+namespace {
+
+std::string ConvertedSentence(const CheckReport& report) {
   const ModelCheck& check = report.check;
   if (check.is_adjusted) return ForAdjusted(report);
   const bool is_camera = !check.cameras.empty();
@@ -317,6 +322,15 @@ std::string CheckSentence(const CheckReport& report) {
   return (is_camera ? CamerasSentence(check)
                     : "The model is not adjusted, so adjust it first.") +
          " As it stands: " + ForAdjusted(report);
+}
+
+}  // namespace
+
+std::string CheckSentence(const CheckReport& report) {
+  const auto& conventions = report.check.conventions;
+  return (conventions ? ConventionsSentence(*conventions) + " Once converted: "
+                      : "") +
+         ConvertedSentence(report);
 }
 
 std::string CheckTable(const CheckReport& report, int max_rows) {

@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <functional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "krot/base/numbers.h"
 #include "krot/report/report_json.h"
@@ -130,6 +133,81 @@ std::string CamerasSentence(const ModelCheck& check) {
          ". So adjust the model first, with all cameras free.";
 }
 
+namespace {
+
+// For example "x right, y down, z forward".
+std::string AxesWords(const Conventions& conventions) {
+  constexpr const char* kDirections[] = {"left", "right",    "up",
+                                         "down", "backward", "forward"};
+  Eigen::Matrix3d axes = conventions.cam_from_file_axes;
+  if (conventions.is_left_handed) axes.col(1) = -axes.col(1);
+  std::vector<std::string> words;
+  for (int j = 0; j < 3; ++j) {
+    Eigen::Index i = 0;
+    axes.col(j).cwiseAbs().maxCoeff(&i);
+    words.push_back(std::string(1, "xyz"[j]) + " " +
+                    kDirections[2 * i + (axes(i, j) > 0 ? 1 : 0)]);
+  }
+  return ListText(words);
+}
+
+// What differs from COLMAP's conventions, for example "poses from camera to
+// world".
+std::string ConventionWords(const Conventions& one) {
+  std::vector<std::string> words;
+  if (one.has_w_last) words.push_back("quaternions with w last (x, y, z, w)");
+  if (one.is_world_from_cam) {
+    words.push_back(one.has_centers ? "poses from camera to world"
+                                    : "rotations from camera to world");
+  } else if (one.has_centers) {
+    words.push_back("camera centres in place of translations");
+  }
+  if (one.is_left_handed || !one.cam_from_file_axes.isIdentity()) {
+    words.push_back(std::string(one.is_left_handed ? "left-handed " : "") +
+                    "camera axes (" + AxesWords(one) + ")");
+  }
+  if (one.intrinsics_factor != 1) {
+    const bool is_larger = one.intrinsics_factor < 1;
+    words.push_back(
+        "intrinsics for photos " +
+        FormatNumber(
+            is_larger ? 1 / one.intrinsics_factor : one.intrinsics_factor, 0) +
+        (is_larger ? " times as large" : " times smaller"));
+  }
+  if (one.has_central_principal_point) {
+    words.push_back("principal points far from the middle of the photos");
+  }
+  if (one.has_wrong_points) {
+    words.push_back("3D points that are not where the images see them");
+  }
+  return ListText(std::move(words));
+}
+
+}  // namespace
+
+std::string ConventionsSentence(const Conventions& one) {
+  const bool is_read_otherwise = one.HasOtherPoses() ||
+                                 one.intrinsics_factor != 1 ||
+                                 one.has_central_principal_point;
+  return (is_read_otherwise
+              ? "The model is not in COLMAP's conventions, but has "
+              : "The model has ") +
+         ConventionWords(one) + ": converted, its median error falls from " +
+         FormatNumber(one.median_error_as_read_px, 2) + " to " +
+         Pixels(one.median_error_px, 2) + ".";
+}
+
+nlohmann::ordered_json ConventionsJson(const Conventions& one) {
+  Json json = {{"words", ConventionWords(one)}};
+  json.update(KROT_JSON_OF(one, has_w_last, is_world_from_cam, has_centers,
+                           is_left_handed));
+  json["camera_axes"] = AxesWords(one);
+  json.update(KROT_JSON_OF(one, intrinsics_factor, has_central_principal_point,
+                           has_wrong_points, median_error_as_read_px,
+                           median_error_px));
+  return json;
+}
+
 std::string CameraTable(const ModelCheck& check, size_t max_rows) {
   return TitledTable(
       "Wrong cameras", {"camera", "images", "squared errors that go, %", "why"},
@@ -236,6 +314,7 @@ std::string CheckJson(const CheckReport& report) {
       {"verdict", CheckSentence(report)},
       {"is_anything_wrong", check.IsAnythingWrong()},
       {"is_adjusted", check.is_adjusted},
+      {"conventions", JsonIf(check.conventions, ConventionsJson)},
       {"num_images", check.images.size()},
       {"num_wrong_images", check.NumImages(ImageVerdict::kWrong)},
       {"num_weakly_held_images", check.NumImages(ImageVerdict::kWeaklyHeld)},

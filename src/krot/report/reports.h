@@ -141,6 +141,8 @@ std::string SigmaText(double sigma);
 // What too few tracks tie to the rest of a model; "" if all is tied.
 std::string PartsSentence(const ModelCheck& check);
 std::string PartTable(const ModelCheck& check, size_t max_rows);
+// How the model's numbers are to be read.
+std::string ConventionsSentence(const Conventions& conventions);
 // What is wrong with cameras that images share, and what to do; requires one at
 // least.
 std::string CamerasSentence(const ModelCheck& check);

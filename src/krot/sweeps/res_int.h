@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "krot/base/context.h"
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/minimax/fast_descent.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"

@@ -11,6 +11,7 @@
 #include "krot/base/context.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
+#include "krot/conic/cones.h"
 #include "krot/model/derived_models.h"
 #include "krot/model/model_io.h"
 #include "krot/problem/known_rotation_problem.h"

@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {

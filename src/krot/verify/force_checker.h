@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 #include "krot/verify/certificate_check.h"

@@ -1,0 +1,191 @@
+#include <cmath>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include "krot/check.h"
+#include "krot/model.h"
+#include "krot/synthetic/scene.h"
+#include "tests/testing/scene_of.h"
+
+namespace krot::internal {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+Model SceneOfColmap(int seed, double outlier_ratio = 0) {
+  SceneOptions options = SceneOf(12, 200, 4, 0.5, seed);
+  options.outlier_ratio = outlier_ratio;
+  return SynthesizeScene(options).model;
+}
+
+// A program whose camera axes point along these of COLMAP's.
+Matrix3d Axes(const Vector3d& x, const Vector3d& y, const Vector3d& z) {
+  Matrix3d axes;
+  axes << x, y, z;
+  return axes;
+}
+const Vector3d kRight = Vector3d::UnitX();
+const Vector3d kDown = Vector3d::UnitY();
+const Vector3d kForward = Vector3d::UnitZ();
+
+// How a program writes poses.
+struct Program {
+  const char* name;
+  Matrix3d axes;
+  bool writes_camera_to_world, writes_centers, writes_w_last;
+};
+
+// The model in that program's numbers. In a left-handed one the world's y is
+// turned round, too.
+Model WrittenBy(const Program& program, Model model) {
+  const Matrix3d world_from_file =
+      program.axes.determinant() < 0 ? Matrix3d(Vector3d(1, -1, 1).asDiagonal())
+                                     : Matrix3d(Matrix3d::Identity());
+  for (Point3D& point : model.points3D) point.xyz = world_from_file * point.xyz;
+  for (Frame& frame : model.frames) {
+    Pose& pose = frame.rig_from_world;
+    Matrix3d rotation =
+        program.axes.transpose() * pose.Rotation() * world_from_file;
+    Vector3d translation = program.axes.transpose() * pose.translation;
+    if (program.writes_centers)
+      translation = -rotation.transpose() * translation;
+    if (program.writes_camera_to_world) rotation.transposeInPlace();
+    pose = ToPose({rotation, translation});
+    if (program.writes_w_last) {
+      const auto [w, x, y, z] = pose.quaternion_wxyz;
+      pose.quaternion_wxyz = {x, y, z, w};
+    }
+  }
+  return model;
+}
+
+std::vector<Program> Programs() {
+  return {
+      {"inverse poses", Axes(kRight, kDown, kForward), true, true, false},
+      {"inverse rotations", Axes(kRight, kDown, kForward), true, false, false},
+      {"centres", Axes(kRight, kDown, kForward), false, true, false},
+      {"w last", Axes(kRight, kDown, kForward), false, false, true},
+      {"OpenGL", Axes(kRight, -kDown, -kForward), true, true, false},
+      {"OpenGL, w last", Axes(kRight, -kDown, -kForward), true, true, true},
+      {"a robot's", Axes(kForward, -kRight, -kDown), true, true, true},
+      {"Unity", Axes(kRight, -kDown, kForward), true, true, true},
+      {"Unreal", Axes(kForward, kRight, -kDown), true, true, true},
+  };
+}
+
+TEST(FindConventions, FindsNoneInModelsOfColmap) {
+  for (int seed = 1; seed <= 5; ++seed) {
+    EXPECT_FALSE(FindConventions(SceneOfColmap(seed)));
+    EXPECT_FALSE(FindConventions(SceneOfColmap(seed, /*outlier_ratio=*/0.3)));
+  }
+}
+
+TEST(FindConventions, FindsNoneWherePosesAreWrongInDifferentWays) {
+  for (int seed = 1; seed <= 3; ++seed) {
+    Model model = SceneOfColmap(seed);
+    std::srand(seed);
+    for (Frame& frame : model.frames) {
+      frame.rig_from_world.quaternion_wxyz =
+          ToWxyz(Eigen::Quaterniond::UnitRandom());
+    }
+    EXPECT_FALSE(FindConventions(model));
+  }
+}
+
+// What the conversion must give back: rays and points as in COLMAP's model, up
+// to the world's axes.
+TEST(FindConventions, FindsHowAnotherProgramWritesPoses) {
+  for (const Program& program : Programs()) {
+    SCOPED_TRACE(program.name);
+    const Model model = SceneOfColmap(1, /*outlier_ratio=*/0.1);
+    const Model written = WrittenBy(program, model);
+    const auto found = FindConventions(written);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->has_w_last, program.writes_w_last);
+    EXPECT_EQ(found->is_world_from_cam, program.writes_camera_to_world);
+    EXPECT_EQ(found->has_centers, program.writes_centers);
+    EXPECT_EQ(found->is_left_handed, program.axes.determinant() < 0);
+    EXPECT_EQ(found->intrinsics_factor, 1);
+    EXPECT_FALSE(found->has_wrong_points);
+
+    const std::vector<double> before = PixelErrors(model);
+    const std::vector<double> after =
+        PixelErrors(ConvertModel(written, *found));
+    for (size_t e = 0; e < before.size(); ++e) {
+      EXPECT_NEAR(after[e], before[e], 1e-6) << e;
+    }
+  }
+}
+
+TEST(FindConventions, SaysWhatChecksThenFind) {
+  const Model model = SceneOfColmap(2, /*outlier_ratio=*/0.05);
+  const Model written = WrittenBy(Programs()[4], model);
+  const ModelCheck expected = CheckModel(model);
+  const ModelCheck check = CheckModel(written);
+  ASSERT_TRUE(check.conventions);
+  EXPECT_TRUE(check.IsAnythingWrong());
+  EXPECT_FALSE(expected.conventions);
+  ASSERT_EQ(check.observations.size(), expected.observations.size());
+  EXPECT_NEAR(*check.sigma_px, *expected.sigma_px, 1e-6);
+  const Model cured = CureModel(written, check).model;
+  EXPECT_FALSE(CheckModel(cured).conventions);
+  EXPECT_NEAR(Summarize(PixelErrors(cured)).rms,
+              Summarize(PixelErrors(CureModel(model, expected).model)).rms,
+              1e-6);
+}
+
+TEST(FindConventions, FindsIntrinsicsOfPhotosOfAnotherSize) {
+  for (const double factor : {0.25, 2.0}) {
+    Model model = SceneOfColmap(3);
+    const std::vector<double> before = PixelErrors(model);
+    for (Camera& camera : model.cameras) {
+      for (size_t i = 0; i < 3; ++i) camera.params[i] /= factor;
+    }
+    const auto found = FindConventions(model);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->intrinsics_factor, factor);
+    EXPECT_FALSE(found->HasOtherPoses());
+    const std::vector<double> after = PixelErrors(ConvertModel(model, *found));
+    for (size_t e = 0; e < before.size(); ++e) {
+      EXPECT_NEAR(after[e], before[e], 1e-6) << e;
+    }
+  }
+}
+
+TEST(FindConventions, FindsPointsThatAreNotWhereImagesSeeThem) {
+  Model model = SceneOfColmap(4);
+  const double before = Summarize(PixelErrors(model)).rms;
+  for (Point3D& point : model.points3D) point.xyz *= -1;
+  const auto found = FindConventions(model);
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(found->has_wrong_points);
+  EXPECT_FALSE(found->HasOtherPoses());
+  EXPECT_EQ(found->intrinsics_factor, 1);
+  const Model cured = CureModel(model, CheckModel(model)).model;
+  EXPECT_LE(Summarize(PixelErrors(cured)).rms, before);
+}
+
+// As for triangulation with known poses.
+TEST(FindConventions, AsksTheMatchesWhereThereAreNoTracks) {
+  const Model model = SceneOfColmap(5);
+  const Database database = DatabaseOf(model);
+  for (const Program& program : Programs()) {
+    SCOPED_TRACE(program.name);
+    Model written = WrittenBy(program, model);
+    written.points3D.clear();
+    written.track_elements.clear();
+    const auto found = FindConventions(written, &database);
+    ASSERT_TRUE(found);
+    const Model converted = ConvertModel(written, *found);
+    EXPECT_FALSE(FindConventions(converted, &database));
+    EXPECT_FALSE(CheckPairs(converted, database).IsAnythingWrong());
+    EXPECT_FALSE(FindConventions(written));
+  }
+}
+
+}  // namespace
+}  // namespace krot::internal
