@@ -2,9 +2,11 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <random>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -264,6 +266,67 @@ TEST_P(RemainderBoundOf, IsTheBallsOwnInTheDirectionOfThePoint) {
     EXPECT_LE(*bound, (1 + 1e-5) * own) << "trial " << i << ", p " << trial->p;
   }
   EXPECT_GT(num_mild, 20);
+}
+
+// Counts the boxes on which a map is enclosed.
+class CountingMap : public ErrorMap {
+ public:
+  explicit CountingMap(std::unique_ptr<ErrorMap> map) : map_(std::move(map)) {}
+  ErrorPair<Interval> Values(const Interval& q1,
+                             const Interval& q2) const override {
+    return map_->Values(q1, q2);
+  }
+  ErrorPair<Dual<Interval>> Derivatives(const Interval& q1,
+                                        const Interval& q2) const override {
+    ++count_;
+    return map_->Derivatives(q1, q2);
+  }
+  int count() const { return count_; }
+
+ private:
+  const std::unique_ptr<ErrorMap> map_;
+  mutable int count_ = 0;
+};
+
+// SIMPLE_RADIAL with k = -0.3 and f = 1000, 697 px from the centre, where the
+// ball of 3 px bends by a tenth. The row is taken at the point of the ball in
+// the direction (c, s), the pixel's own ray, or anywhere between.
+TEST(LargestAlong, NeedsFewBoxesWhereverTheRowIsTaken) {
+  const double params[] = {1000, 0, 0, -0.3};
+  const Intrinsics intrinsics{2, params};
+  const double level = 3;
+  const Eigen::Vector2d pixel(697, 0);
+  for (const double share : {1.0, 0.5, 0.0}) {
+    for (int n = 0; n < 8; ++n) {
+      const Eigen::Vector2d along(std::cos(n * kPi / 4), std::sin(n * kPi / 4));
+      const Eigen::Vector3d x_hat =
+          *PixelBearing(intrinsics, pixel + share * level * along);
+      ErrorMap::Geometry geometry;
+      geometry.pixel = pixel;
+      geometry.E = *RowAtProjection(intrinsics, pixel, x_hat);
+      geometry.X0 = PixelBearing(intrinsics, pixel)->normalized();
+      const auto chart = *ChartAt(intrinsics, x_hat);
+      geometry.X0 /= chart.n.dot(geometry.X0);
+      geometry.G = level * chart.B *
+                   ChartJacobian(intrinsics, chart, geometry.X0).inverse();
+      geometry.on_image_plane = false;
+      geometry.level_px = level;
+      const CountingMap map(MakeErrorMap(intrinsics, geometry));
+      const auto bound = LargestAlong(map, 2, 1.5, -along, 0);
+      ASSERT_TRUE(bound);
+      EXPECT_LT(map.count(), 300);
+      double largest = 0;  // of points of the ball's boundary
+      for (int i = 0; i < 10000; ++i) {
+        const double angle = i * 2 * kPi / 10000;
+        const Eigen::Vector3d ray = *PixelBearing(
+            intrinsics,
+            pixel + level * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+        const Eigen::Vector3d row = geometry.E * ray;
+        largest = std::max(largest, along.dot(row.tail<2>()) / row[0] / level);
+      }
+      EXPECT_NEAR(*bound, largest, 1e-6);
+    }
+  }
 }
 
 TEST(RemainderBound, OfPinholesIsZero) {

@@ -91,11 +91,22 @@ TEST(ExtendSolution, LeavesAloneWhatFits) {
   EXPECT_EQ(extended.translations, solved.estimate.translations);
 }
 
-TEST(ExtendSolution, LeavesPointsBehindACameraAndFails) {
+TEST(ExtendSolution, BringsPointsFromBehindACameraWhereRaysMeet) {
   Solved solved(1, 40, 15);
   int32_t outside = 0;
   while (solved.set.Contains(outside)) ++outside;
   solved.estimate.points[outside] *= -1;
+  Estimate extended;
+  EXPECT_TRUE(solved.Extend(1e6, &extended));
+  EXPECT_LE(solved.CostOf(extended), 1e6);
+}
+
+TEST(ExtendSolution, LeavesPointsThatNoPlacePutsInFrontAndFails) {
+  Solved solved(1, 40, 15);
+  int32_t outside = 0;
+  while (solved.set.Contains(outside)) ++outside;
+  KnownRotationProblem& problem = solved.scene.problem;
+  problem.observations[problem.point_begin[outside]].E *= -1;
   Estimate extended;
   EXPECT_FALSE(solved.Extend(1e6, &extended));
   EXPECT_EQ(extended.points[outside], solved.estimate.points[outside]);

@@ -291,7 +291,7 @@ TEST(SolveJoint, KeepsWhatItHasWhenInterrupted) {
   }
 }
 
-// Fourteen on average; five starts in a hundred take more than sixty.
+// Sixteen on average; five starts in a hundred take more than sixty.
 TEST(SolveJoint, IsThereSoonFromStartsThatHugTheBoundary) {
   size_t num_iterations = 0;
   for (unsigned seed = 1; seed <= 100; ++seed) {
@@ -306,7 +306,7 @@ TEST(SolveJoint, IsThereSoonFromStartsThatHugTheBoundary) {
     EXPECT_LE(summary.iterations.size(), 100u);
     num_iterations += summary.iterations.size();
   }
-  EXPECT_LE(num_iterations, 1550u);
+  EXPECT_LE(num_iterations, 1600u);
 }
 
 // With starts from most of which the interior point gets nowhere.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -225,6 +226,23 @@ TEST(SolveModel, NamesWhatNoProofCanRestOnAsTheLensFolds) {
     EXPECT_FALSE(observation.image_id == image->id &&
                  observation.point2D_idx == point2D_idx);
   }
+
+  // Where the rows' bound has shown a local minimum, rounds end. From nothing
+  // another one may be found, but joint iterations from the model's own start
+  // are not tried.
+  options.method = SolveMethod::kAuto;
+  const std::vector<Round> rounds = SolveModel(model, options).summary.rounds;
+  int num_minima = 0;
+  for (size_t n = 0; n < rounds.size(); ++n) {
+    const std::optional<double> bound = rounds[n].linear_lower_bound;
+    const double gap = options.joint.relative_gap * rounds[n].cost;
+    if (!bound || rounds[n].cost - *bound > gap) continue;
+    ++num_minima;
+    if (n + 1 == rounds.size()) break;
+    EXPECT_GT(rounds[n + 1].cost, rounds[n].cost);
+  }
+  EXPECT_GE(num_minima, 1);
+  EXPECT_LE(num_minima, 2);
 }
 
 TEST(SolveModel, IsDoneAtOnceWhereEveryErrorIsZero) {

@@ -5,6 +5,10 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/LU>
+
+#include "krot/math/norm.h"
+
 namespace krot::internal {
 namespace {
 
@@ -40,33 +44,49 @@ Interval IntervalNorm(const Interval& x, const Interval& y, double p) {
 }
 
 // Enclosures of f and m on a box, by the mean value theorem from its middle.
-struct Enclosure {
+class Enclosure {
+ public:
+  Enclosure(const ErrorMap& map, const Box& box) {
+    const double middle[2] = {Middle(box.q[0]), Middle(box.q[1])};
+    at_middle_ = map.Values({middle[0], middle[0]}, {middle[1], middle[1]});
+    on_box_ = map.Derivatives(box.q[0], box.q[1]);
+    for (int i = 0; i < 2; ++i) from_middle_[i] = box.q[i] - middle[i];
+    for (int i = 0; i < 2; ++i) {
+      f[i] = MeanValue(at_middle_.f[i], on_box_.f[i].du, on_box_.f[i].dv);
+      m[i] = MeanValue(at_middle_.m[i], on_box_.m[i].du, on_box_.m[i].dv);
+    }
+    determinant =
+        on_box_.f[0].du * on_box_.f[1].dv - on_box_.f[0].dv * on_box_.f[1].du;
+  }
+
+  // Encloses a'm - b'f, better than a'm and b'f by themselves where the two are
+  // alike.
+  Interval Difference(const Eigen::Vector2d& a,
+                      const Eigen::Vector2d& b) const {
+    const auto difference = [&](const auto& of) {
+      return (of(on_box_.m[0]) * a[0] - of(on_box_.f[0]) * b[0]) +
+             (of(on_box_.m[1]) * a[1] - of(on_box_.f[1]) * b[1]);
+    };
+    return MeanValue((at_middle_.m[0] * a[0] - at_middle_.f[0] * b[0]) +
+                         (at_middle_.m[1] * a[1] - at_middle_.f[1] * b[1]),
+                     difference([](const Dual<Interval>& x) { return x.du; }),
+                     difference([](const Dual<Interval>& x) { return x.dv; }));
+  }
+
   Interval f[2];
   Interval m[2];
-  Interval remainder[2];  // f - m
-  Interval determinant;   // det f'
-};
+  Interval determinant;  // det f'
 
-Enclosure Enclose(const ErrorMap& map, const Box& box) {
-  const double middle[2] = {Middle(box.q[0]), Middle(box.q[1])};
-  const auto at_middle =
-      map.Values({middle[0], middle[0]}, {middle[1], middle[1]});
-  const auto on_box = map.Derivatives(box.q[0], box.q[1]);
-  const Interval dx = box.q[0] - middle[0];
-  const Interval dy = box.q[1] - middle[1];
-  Enclosure enclosure;
-  for (int i = 0; i < 2; ++i) {
-    const Dual<Interval>& f = on_box.f[i];
-    const Dual<Interval>& m = on_box.m[i];
-    enclosure.f[i] = at_middle.f[i] + f.du * dx + f.dv * dy;
-    enclosure.m[i] = at_middle.m[i] + m.du * dx + m.dv * dy;
-    enclosure.remainder[i] = (at_middle.f[i] - at_middle.m[i]) +
-                             (f.du - m.du) * dx + (f.dv - m.dv) * dy;
+ private:
+  Interval MeanValue(const Interval& at_middle, const Interval& du,
+                     const Interval& dv) const {
+    return at_middle + du * from_middle_[0] + dv * from_middle_[1];
   }
-  enclosure.determinant =
-      on_box.f[0].du * on_box.f[1].dv - on_box.f[0].dv * on_box.f[1].du;
-  return enclosure;
-}
+
+  ErrorPair<Interval> at_middle_;
+  ErrorPair<Dual<Interval>> on_box_;
+  Interval from_middle_[2];
+};
 
 bool IsOutside(const Enclosure& enclosure, double p) {
   return IntervalNorm(enclosure.f[0], enclosure.f[1], p).lo > 1;
@@ -84,7 +104,10 @@ bool IsFoldedInside(const Enclosure& enclosure, double p) {
 // where s'f is bounded by its own enclosure if that is below 1. NaN if there is
 // no bound.
 double BoundLinearError(const Enclosure& enclosure, double p) {
-  const Interval* r = enclosure.remainder;
+  const Interval r[2] = {
+      -enclosure.Difference(Eigen::Vector2d::UnitX(), Eigen::Vector2d::UnitX()),
+      -enclosure.Difference(Eigen::Vector2d::UnitY(),
+                            Eigen::Vector2d::UnitY())};
   const double direct = IntervalNorm(enclosure.m[0], enclosure.m[1], p).hi;
   const Interval f[2] = {ClipToUnit(enclosure.f[0]),
                          ClipToUnit(enclosure.f[1])};
@@ -135,11 +158,9 @@ std::pair<Box, Box> Halves(const Box& box) {
   return halves;
 }
 
-// The value of `value` at a point where f is near d / |d|, or minus infinity if
-// none is found. A search ends when its bound is near the sampled value.
-template <typename Value>
-double Sample(const ErrorMap& map, double p, double d1, double d2,
-              const Value& value) {
+// |m| / |f| at a point where f is near d / |d|, or minus infinity if none is
+// found.
+double SampleLinearError(const ErrorMap& map, double p, double d1, double d2) {
   const double norm = IntervalNorm({d1, d1}, {d2, d2}, p).hi;
   const double wanted[2] = {d1 / norm, d2 / norm};
   double q[2] = {wanted[0], wanted[1]};
@@ -149,14 +170,14 @@ double Sample(const ErrorMap& map, double p, double d1, double d2,
     for (int k = 0; k < 2; ++k) q[k] += wanted[k] - Middle(at.f[k]);
   }
   const auto at = values();
-  const double f[2] = {Middle(at.f[0]), Middle(at.f[1])};
-  const double size = IntervalNorm({f[0], f[0]}, {f[1], f[1]}, p).hi;
-  return size < 1.5 && size > 0.5 ? value(at, size) : -kInfinity;
+  const double size = IntervalNorm(at.f[0], at.f[1], p).hi;
+  return size < 1.5 && size > 0.5 ? IntervalNorm(at.m[0], at.m[1], p).lo / size
+                                  : -kInfinity;
 }
 
 bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
                       int depth) {
-  if (IsOutside(Enclose(map, segment), p)) return true;
+  if (IsOutside(Enclosure(map, segment), p)) return true;
   if (depth == 8) return false;
   const auto [first, second] = Halves(segment);
   return SegmentIsOutside(map, p, first, depth + 1) &&
@@ -174,7 +195,7 @@ std::optional<double> Search(const ErrorMap& map, double p, double reach,
   bool is_folded = false;
   const auto add = [&](const Box& box) {
     ++num_cells;
-    const Enclosure enclosure = Enclose(map, box);
+    const Enclosure enclosure(map, box);
     if (IsOutside(enclosure, p)) return;
     is_folded |= IsFoldedInside(enclosure, p);
     const double bound =
@@ -229,42 +250,93 @@ std::optional<double> LargestLinearError(const ErrorMap& map, double p,
   for (int i = 0; i < kDirections; ++i) {
     const double angle = i * 2 * kPi / kDirections;
     sampled = std::max(
-        sampled, Sample(map, p, std::cos(angle), std::sin(angle),
-                        [p](const auto& at, double size) {
-                          return IntervalNorm(at.m[0], at.m[1], p).lo / size;
-                        }));
+        sampled, SampleLinearError(map, p, std::cos(angle), std::sin(angle)));
   }
   const double target = sampled + std::max(0.1 * (sampled - 1), 1e-6);
   return Search(map, p, reach, target, bound_on);
 }
 
+namespace {
+
+Interval Along(const Eigen::Vector2d& d, const Interval* v) {
+  return v[0] * d[0] + v[1] * d[1];
+}
+
+// The point of the ball |f| <= 1 that is farthest along g.
+Eigen::Vector2d FarthestInBall(const Eigen::Vector2d& g, double p) {
+  if (p == 2) return g.normalized();
+  const Eigen::Vector2d corner(g[0] < 0 ? -1 : 1, g[1] < 0 ? -1 : 1);
+  if (std::isinf(p)) return corner;
+  const int longer = std::abs(g[0]) < std::abs(g[1]) ? 1 : 0;
+  return corner[longer] * Eigen::Vector2d::Unit(longer);
+}
+
+// Where -y'm is largest over |f| <= 1, as far as that is found. It only guides
+// the search.
+struct Touch {
+  Eigen::Vector2d gradient;   // of -y'm there, as a function of f
+  double value = -kInfinity;  // of -y'm; a search ends near it
+};
+
+// Newton's method, with a new direction in every step: f is to be the point of
+// the ball that is farthest along the gradient.
+Touch FindTouch(const ErrorMap& map, double p, double reach,
+                const Eigen::Vector2d& y) {
+  Touch touch{-y};
+  Eigen::Vector2d q = FarthestInBall(-y, p);
+  for (int step = 0; step < 12; ++step) {
+    const auto at = map.Derivatives({q[0], q[0]}, {q[1], q[1]});
+    Eigen::Vector2d f, m;
+    Eigen::Matrix2d df, dm;  // by q
+    for (int i = 0; i < 2; ++i) {
+      f[i] = Middle(at.f[i].value);
+      m[i] = Middle(at.m[i].value);
+      df.row(i) << Middle(at.f[i].du), Middle(at.f[i].dv);
+      dm.row(i) << Middle(at.m[i].du), Middle(at.m[i].dv);
+    }
+    const Eigen::Matrix2d df_inverse = df.inverse();
+    const Eigen::Vector2d gradient = -(dm * df_inverse).transpose() * y;
+    if (!gradient.allFinite()) break;
+    touch.gradient = gradient;
+    const double size = IntervalNorm({f[0], f[0]}, {f[1], f[1]}, p).hi;
+    if (size < 1 + 1e-5) {
+      touch.value = std::max(touch.value, -y.dot(m) / std::max(size, 1.0));
+    }
+    const Eigen::Vector2d missing = FarthestInBall(gradient, p) - f;
+    q += df_inverse * missing;
+    if (missing.norm() < 1e-8 || !(q.lpNorm<Eigen::Infinity>() <= reach)) break;
+  }
+  return touch;
+}
+
+}  // namespace
+
 std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
                                    const Eigen::Vector2d& y,
                                    double sufficient) {
-  const auto along = [&y](const Interval* v) {
-    return v[0] * -y[0] + v[1] * -y[1];
+  const Touch touch = FindTouch(map, p, reach, y);
+  const Eigen::Vector2d& g = touch.gradient;
+  const Eigen::Vector2d across(-g[1], g[0]);
+  const double length = DualNorm(g, {p}) * (1 + 1e-14);
+  // For any g, -y'm = g'f + (-y'm - g'f). With the gradient, the second term is
+  // of second order around the touch. The first is at most |g|_*; for p = 2, as
+  // (g'f)^2 + (across'f)^2 = |g|^2 |f|^2, it falls as fast on both sides of the
+  // touch. So boxes may be the larger, the farther away they are.
+  const auto bound_on = [&](const Enclosure& enclosure) {
+    double first = Along(g, enclosure.f).hi;
+    if (!(first < length)) first = length;
+    const Interval aside = Absolute(Along(across, enclosure.f));
+    if (p == 2 && aside.lo < length) {
+      const Interval square = Interval{length, length} * length -
+                              Interval{aside.lo, aside.lo} * aside.lo;
+      first = std::min(first, sqrt(square).hi);
+    }
+    const double sum = (first + enclosure.Difference(-y, g)).hi;
+    const double direct = Along(-y, enclosure.m).hi;
+    return direct < sum ? direct : sum;
   };
-  // The point at which a line with normal -y touches the ball |f| <= 1.
-  double d[2] = {-y[0], -y[1]};
-  if (p == 1) d[std::abs(y[0]) < std::abs(y[1]) ? 0 : 1] = 0;
-  if (std::isinf(p)) {
-    for (double& x : d) x = x < 0 ? -1 : 1;
-  }
-  const double sampled =
-      Sample(map, p, d[0], d[1], [&](const auto& at, double size) {
-        return along(at.m).lo / std::max(size, 1.0);
-      });
-  // -y'm = -y'f + y'r. The first term is at most |f| <= 1, and the second is of
-  // second order around x_hat.
-  return Search(map, p, reach, std::max(sampled + 1e-7, sufficient),
-                [&](const Enclosure& enclosure) {
-                  const double direct = along(enclosure.m).hi;
-                  const double first = along(enclosure.f).hi;
-                  const Interval sum = Interval{0, first < 1 ? first : 1.0} -
-                                       along(enclosure.remainder);
-                  if (!(sum.hi < kInfinity)) return direct;
-                  return direct < sum.hi ? direct : sum.hi;
-                });
+  return Search(map, p, reach, std::max(touch.value + 1e-7, sufficient),
+                bound_on);
 }
 
 }  // namespace krot::internal

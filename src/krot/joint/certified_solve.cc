@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/conic/interior_point.h"
 #include "krot/problem/cost.h"
 
@@ -14,10 +15,8 @@ namespace {
 
 // The interior point's relative gap above which it is far from its optimum.
 constexpr double kLargeGap = 0.1;
-// Start margins: how far above the cost gamma starts, relative. The fresh
-// start's is also how far above the cost an estimate may be that is to replace
-// one with points in cameras.
-constexpr double kStartMargin = 0.1;
+// The start margin from a fresh start. It is also how far above the cost an
+// estimate may be that is to replace one with tiny parts.
 constexpr double kFreshStartMargin = 1e-3;
 
 CertificateOptions Sufficient(double bound) {
@@ -36,6 +35,26 @@ bool HasPointsInCameras(const KnownRotationProblem& problem,
         std::min(smallest, ViewPoint(problem, observation, estimate).depth);
   }
   return smallest < 1e-6 * MedianDepth(problem, estimate);
+}
+
+bool HasTinyParts(const KnownRotationProblem& problem,
+                  const Estimate& estimate) {
+  std::vector<double> depths;
+  std::vector<int32_t> frame_of;
+  for (const Observation& observation : problem.observations) {
+    depths.push_back(ViewPoint(problem, observation, estimate).depth);
+    frame_of.push_back(problem.views[observation.view].frame);
+  }
+  const std::vector<double> medians =
+      GroupMedians(depths, frame_of, problem.num_frames, Context());
+  double smallest = std::numeric_limits<double>::infinity();
+  double largest = 0;
+  for (const double median : medians) {
+    if (!(median > 0)) continue;
+    smallest = std::min(smallest, median);
+    largest = std::max(largest, median);
+  }
+  return smallest < 1e-5 * largest;
 }
 
 CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
@@ -146,14 +165,14 @@ FeasibleStartOptions CertifiedSolve::OptionsForStart(
   return options;
 }
 
-// Where a point is in a camera, coordinates do not resolve its depth, and its
-// multipliers become huge: the interior point would stall far from
-// stationarity. So the start is replaced by one that is found from nothing and
-// has points and cameras apart, even if it is slightly worse. Returns whether
-// the start was replaced.
-bool CertifiedSolve::LeaveCameras(const IterationReport& report,
+// Parts that only weak links hold together may differ in scale by orders of
+// magnitude. The barrier draws all depths towards their mean, and from such a
+// start that takes hundreds of iterations. So it is replaced by one that is
+// found from nothing, where all parts are of a size, even if that is slightly
+// worse. Returns whether the start was replaced.
+bool CertifiedSolve::EvenOutParts(const IterationReport& report,
                                   Estimate* start) {
-  if (!HasPointsInCameras(problem_, *start)) return false;
+  if (!HasTinyParts(problem_, *start)) return false;
   std::vector<Multiplier> multipliers;
   return FindEstimateBelow(problem_, (1 + kFreshStartMargin) * cost_,
                            OptionsForStart(report), context_, start,
@@ -226,7 +245,7 @@ SolveTermination CertifiedSolve::Run(int max_iterations,
   if (options_.IsLowEnough(cost_)) return SolveTermination::kGapReached;
   double start_margin = are_multipliers_known_ ? WarmMargin() : kStartMargin;
   Estimate start = estimate_;
-  if (LeaveCameras(report, &start)) start_margin = kFreshStartMargin;
+  if (EvenOutParts(report, &start)) start_margin = kFreshStartMargin;
   for (;;) {
     const InteriorPointTermination termination =
         RunFrom(start, start_margin, take, report);

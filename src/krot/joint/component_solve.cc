@@ -77,7 +77,7 @@ SolveTermination ComponentSolve::SolvePart(const Place& place,
   JointOptions options = options_;
   if (!set_.IsAll()) options.relative_gap *= kShareOfGapForProof;
   const Context here = WithoutRanks(context_);
-  const Estimate start = part.Restrict(place.best);
+  const Estimate start = part.Restrict(place.start);
   const std::vector<int64_t> names = place.InWhole(part);
   CertifiedSolve solve(part.problem(), options, here, start, lower_bound_,
                        CanStartWarm(part.problem(), start)
@@ -132,30 +132,35 @@ SolveTermination ComponentSolve::SolveParts(const Place& place,
   return worst;
 }
 
+// Starts from the last set's solution unless what it leaves of other points is
+// above the gamma at which the interior point would start from the best
+// estimate.
 SolveTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
                                                  Estimate* candidate) {
   std::vector<int64_t> observations = set_.Observations();
   num_working_observations_ =
       SumOfRanks(context_, static_cast<int64_t>(observations.size()));
   do_others_fit_ = true;
-  if (context_.ranks != nullptr) return SolveGathered(report, candidate);
-  return SolveParts({problem_, estimate_, candidate,
+  const bool is_near = CostOf(*candidate) < (1 + kStartMargin) * cost_;
+  const Estimate start = is_near ? *candidate : estimate_;
+  if (context_.ranks != nullptr) return SolveGathered(start, report, candidate);
+  return SolveParts({problem_, start, candidate,
                      [&] { return FitOthers(candidate); }, nullptr},
                     std::move(observations), report);
 }
 
 // SolveWorkingSet where ranks share the points. The first rank solves the set;
 // whenever it calls fit_others, all ranks take part in FitOthers.
-SolveTermination ComponentSolve::SolveGathered(const IterationReport& report,
+SolveTermination ComponentSolve::SolveGathered(const Estimate& start,
+                                               const IterationReport& report,
                                                Estimate* candidate) {
   Ranks& ranks = *context_.ranks;
   const GatheredPart gathered(problem_, set_.Observations(), &ranks);
-  Estimate best = gathered.Collect(estimate_);
+  const Estimate start_here = gathered.Collect(start);
   Estimate moved = gathered.Collect(*candidate);
   const auto fit_others = [&] {
     gathered.Scatter(moved, candidate);
     const bool do_fit = FitOthers(candidate);
-    best = gathered.Collect(estimate_);
     moved = gathered.Collect(*candidate);
     return do_fit;
   };
@@ -169,7 +174,7 @@ SolveTermination ComponentSolve::SolveGathered(const IterationReport& report,
   if (ranks.IsFirst()) {
     std::vector<int64_t> all(gathered.in_whole().size());
     std::iota(all.begin(), all.end(), 0);
-    const Place place = {gathered.problem(), best, &moved,
+    const Place place = {gathered.problem(), start_here, &moved,
                          [&] { return is_asked(1) && fit_others(); },
                          &gathered.in_whole()};
     termination = SolveParts(place, std::move(all), report);
@@ -254,8 +259,8 @@ SolveTermination ComponentSolve::Run(const IterationReport& report) {
       int64_t{10} * problem_.num_frames) {
     set_.AddAll();
   }
+  Estimate candidate = estimate_;
   for (int round = 1;; ++round) {
-    Estimate candidate = estimate_;
     const SolveTermination termination = SolveOrTake(report, &candidate);
     if (IsGapReached()) return SolveTermination::kGapReached;
     if (set_.IsAll() || termination == SolveTermination::kInterrupted ||

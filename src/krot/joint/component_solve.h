@@ -19,11 +19,20 @@ namespace krot::internal {
 // Called after every iteration, with only `gap` or `target` filled in.
 using IterationReport = std::function<void(const JointIteration&)>;
 
+// How far above the cost gamma is where the interior point starts without
+// multipliers, relative.
+inline constexpr double kStartMargin = 0.1;
+
 // Whether a point is in a camera: its depth there is so small, compared with
 // the median depth, that the digits of coordinates do not resolve it.
 // O(observations).
 bool HasPointsInCameras(const KnownRotationProblem& problem,
                         const Estimate& estimate);
+
+// Whether the median depths of frames differ so much that a part of the problem
+// is tiny beside another. O(observations).
+bool HasTinyParts(const KnownRotationProblem& problem,
+                  const Estimate& estimate);
 
 // Solves a connected problem by the interior point, from an estimate to the
 // certified gap. Tries certificates on the way, and begins again from another
@@ -73,7 +82,7 @@ class CertifiedSolve {
                                    const TakeEstimate& take,
                                    const IterationReport& report);
   FeasibleStartOptions OptionsForStart(const IterationReport& report);
-  bool LeaveCameras(const IterationReport& report, Estimate* start);
+  bool EvenOutParts(const IterationReport& report, Estimate* start);
   bool FindFreshStart(const IterationReport& report);
   bool Bisect(double width, const IterationReport& report);
   bool TryBelow(double bound, const IterationReport& report);
@@ -132,7 +141,7 @@ class ComponentSolve {
   // where ranks share the points, the set gathered on the first rank.
   struct Place {
     const KnownRotationProblem& problem;  // contains the working set
-    const Estimate& best;                 // the best so far, of `problem`
+    const Estimate& start;                // of `problem`
     Estimate* candidate;                  // the one being solved, of `problem`
     std::function<bool()> fit_others;     // FitOthers of the candidate
     // Maps observations of `problem` to the whole's; null means identity.
@@ -145,7 +154,8 @@ class ComponentSolve {
                                Estimate* candidate);
   SolveTermination SolveWorkingSet(const IterationReport& report,
                                    Estimate* candidate);
-  SolveTermination SolveGathered(const IterationReport& report,
+  SolveTermination SolveGathered(const Estimate& start,
+                                 const IterationReport& report,
                                  Estimate* candidate);
   SolveTermination SolveParts(const Place& place,
                               std::vector<int64_t> observations,

@@ -276,8 +276,9 @@ WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
                            const Context& context = {});
 
 // Moves every point with a residual above `level`, pixels, towards the optimum
-// of its largest residual with the frames fixed; points behind a camera stay.
-// Returns whether there are no such points. O(observations).
+// of its largest residual with the frames fixed. A point behind a camera starts
+// from where it is nearest to its rays; it stays if that is behind a camera,
+// too. Returns whether there are no such points. O(observations).
 bool PlacePoints(const KnownRotationProblem& problem, Norm norm,
                  const Context& context, double level, Estimate* estimate);
 
@@ -289,8 +290,7 @@ bool PlacePoints(const KnownRotationProblem& problem, Norm norm,
 // one of its frames.
 //
 // Returns whether it succeeded; `estimate` keeps what was reached in any case.
-// Fails if a point is behind a camera, where it stays. O(observations) per
-// sweep.
+// Fails if a point stays behind a camera. O(observations) per sweep.
 bool ExtendSolution(const KnownRotationProblem& problem, Norm norm,
                     const Context& context, double level, double highest,
                     Estimate* estimate);

@@ -10,7 +10,6 @@
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/problem/cost.h"
-#include "krot/sweeps/res_int.h"
 
 namespace krot::internal {
 namespace {
@@ -332,43 +331,6 @@ WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
                ShareOfLevel(problem, estimate, context));
   set.AddTies(20);
   return set;
-}
-
-bool PlacePoints(const KnownRotationProblem& problem, Norm norm,
-                 const Context& context, double level, Estimate* estimate) {
-  BlockSweep blocks(problem, FastDescentOptions(), norm, context);
-  DescentGoal goal;
-  goal.level = level;
-  // Less than the share above which a working set takes points in
-  // (component_solve.cc).
-  goal.sufficient = 0.7 * level;
-  blocks.SetGoal(goal);
-  return std::isfinite(blocks.IntersectPoints(estimate));
-}
-
-bool ExtendSolution(const KnownRotationProblem& problem, Norm norm,
-                    const Context& context, double level, double highest,
-                    Estimate* estimate) {
-  if (!PlacePoints(problem, norm, context, level, estimate)) return false;
-  const auto excess = [&] {
-    return MaxOfRanks(context,
-                      Cost(problem, *estimate, norm, context.num_threads)) -
-           highest;
-  };
-  double left = excess();
-  if (left <= 0) return true;
-  // Blocks well below the highest cost allowed stay. Sweeps end where one takes
-  // less than a fifth off the excess.
-  BlockSweep blocks(problem, FastDescentOptions(), norm, context);
-  blocks.SetGoal({/*tolerance=*/1e-3, /*level=*/0.9 * highest});
-  for (int sweep = 0; sweep < 10; ++sweep) {
-    blocks.ResectFrames(estimate);
-    blocks.IntersectPoints(estimate);
-    const double before = std::exchange(left, excess());
-    if (left <= 0) return true;
-    if (left > 0.8 * before) return false;
-  }
-  return false;
 }
 
 }  // namespace krot::internal

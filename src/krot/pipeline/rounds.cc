@@ -216,6 +216,12 @@ class Rounds {
       return false;
     }
     if (has_level || is_bound_near_) return true;
+    // Where a proof for the rows has reached the gap, another round could lower
+    // the cost by no more than that, and lenses would bend no less.
+    if (is_tried && round.linear_lower_bound &&
+        cost_ - *round.linear_lower_bound <= bounds_.relative_gap * cost_) {
+      return false;
+    }
     const bool is_idle = !(cost_ < (1 - 1e-6) * before);
     num_idle_rounds_ = is_idle ? num_idle_rounds_ + 1 : 0;
     if (round.linear_cost <= kFarFromRows * cost_) known_multipliers_ = {};

@@ -172,6 +172,15 @@ bool IsWithin(double relative_gap,
   return certificate && cost - certificate->lower_bound <= relative_gap * cost;
 }
 
+// Whether the estimate is a local minimum up to the gap: a bound on the rows
+// taken at it shows that.
+bool IsLocalMinimum(double relative_gap, const SolveSummary& summary) {
+  if (summary.rounds.empty()) return false;
+  const std::optional<double> bound = summary.rounds.back().linear_lower_bound;
+  return bound &&
+         summary.cost_final - *bound <= relative_gap * summary.cost_final;
+}
+
 // The estimate from which another way starts; none if none is found.
 std::optional<Estimate> OtherStart(const Start& other, const SolveRun& run,
                                    SolveSummary* summary) {
@@ -202,7 +211,11 @@ void TryOtherWays(const SolveRun& run, Start* start, Estimate* estimate,
   // of rounding. The way without sweeps comes first then.
   const bool is_own_first =
       HasPointsInCameras(start->built.problem, start->built.start);
+  // That way leads past what stops sweeps, and a local minimum is no such
+  // place.
+  const bool is_minimum = IsLocalMinimum(options.joint.relative_gap, *summary);
   for (const bool is_own : {is_own_first, !is_own_first}) {
+    if (is_own && is_minimum) continue;
     // A stall with a gap of a few times the one asked for is an answer.
     if (summary->termination != SolveTermination::kStalled ||
         IsWithin(10 * options.joint.relative_gap, *certificate,
