@@ -157,20 +157,6 @@ std::vector<double> EpipolarErrors(const std::vector<WitnessMatch>& matches,
   return errors;
 }
 
-void NearestPoint::Add(const Eigen::Vector3d& point,
-                       const Eigen::Vector3d& direction, double weight) {
-  const Eigen::Matrix3d across = weight * (Eigen::Matrix3d::Identity() -
-                                           direction * direction.transpose());
-  normal_ += across;
-  right_side_ += across * point;
-}
-
-std::optional<Eigen::Vector3d> NearestPoint::Solve() const {
-  const Eigen::FullPivLU<Eigen::Matrix3d> decomposition(normal_);
-  if (!decomposition.isInvertible()) return std::nullopt;
-  return decomposition.solve(right_side_);
-}
-
 namespace {
 
 // A square of directions on the face of the cube where coordinate `face` is 1.

@@ -15,6 +15,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/database.h"
 #include "krot/geometry.h"
+#include "krot/geometry/transform.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 
@@ -137,21 +138,6 @@ RigidTransform FitEpipolarPose(const std::vector<WitnessMatch>& matches,
 // The errors of the matches under a pose of their image: Sampson's distances.
 std::vector<double> EpipolarErrors(const std::vector<WitnessMatch>& matches,
                                    const RigidTransform& cam_from_world);
-
-// The point with the least weighted sum of squared distances to lines.
-class NearestPoint {
- public:
-  // A line through a point along a unit vector.
-  void Add(const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
-           double weight);
-
-  // None where the lines do not determine it.
-  std::optional<Eigen::Vector3d> Solve() const;
-
- private:
-  Eigen::Matrix3d normal_ = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right_side_ = Eigen::Vector3d::Zero();
-};
 
 // The baseline that explains most matches.
 struct BaselineSearch {

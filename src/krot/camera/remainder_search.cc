@@ -7,7 +7,7 @@
 
 #include <Eigen/LU>
 
-#include "krot/math/norm.h"
+#include "krot/geometry.h"
 
 namespace krot::internal {
 namespace {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/LU>
 #include <Eigen/SVD>
 
 #include "krot/base/numbers.h"
@@ -137,6 +138,20 @@ std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
                   scale_is_free);
   }
   return keeps;
+}
+
+void NearestPoint::Add(const Eigen::Vector3d& point,
+                       const Eigen::Vector3d& direction, double weight) {
+  const Eigen::Matrix3d across = weight * (Eigen::Matrix3d::Identity() -
+                                           direction * direction.transpose());
+  normal_ += across;
+  right_side_ += across * point;
+}
+
+std::optional<Eigen::Vector3d> NearestPoint::Solve() const {
+  const Eigen::FullPivLU<Eigen::Matrix3d> decomposition(normal_);
+  if (!decomposition.isInvertible()) return std::nullopt;
+  return decomposition.solve(right_side_);
 }
 
 }  // namespace krot::internal

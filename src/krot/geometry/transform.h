@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -15,6 +16,21 @@ Eigen::Vector3d MedianPlace(const std::vector<Eigen::Vector3d>& places);
 // The median distance of places from one of them or any other; 0 without any.
 double MedianDistance(const std::vector<Eigen::Vector3d>& places,
                       const Eigen::Vector3d& from);
+
+// The point with the least weighted sum of squared distances to lines.
+class NearestPoint {
+ public:
+  // A line through a point along a unit vector.
+  void Add(const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
+           double weight);
+
+  // None where the lines do not determine it.
+  std::optional<Eigen::Vector3d> Solve() const;
+
+ private:
+  Eigen::Matrix3d normal_ = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right_side_ = Eigen::Vector3d::Zero();
+};
 
 // A camera in two models of the same scene, whose axes are parallel.
 struct CameraMove {

@@ -1,13 +1,22 @@
 #include "krot/joint/component_solve.h"
 
+#include <cmath>
 #include <numeric>
+#include <optional>
 #include <utility>
+#include <vector>
 
+#include <Eigen/LU>
+
+#include "krot/base/parallel_for.h"
+#include "krot/geometry/transform.h"
 #include "krot/joint/joint.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"
+#include "krot/sweeps/res_int.h"
 
 namespace krot::internal {
 namespace {
@@ -44,7 +53,74 @@ std::optional<Certificate> InWhole(const GatheredPart& part,
   return in_whole;
 }
 
+// Puts the points that are behind a camera where they are nearest to their
+// rays, if that is in front of all.
+void PutInFront(const KnownRotationProblem& problem, const Context& context,
+                Estimate* estimate) {
+  const std::vector<AffineMap> cameras =
+      CamerasFromWorld(problem, estimate->translations);
+  ParallelForEach(problem.num_points, context.num_threads, [&](int64_t k) {
+    if (problem.IsFixedPoint(static_cast<int32_t>(k))) return;
+    const auto is_in_front = [&](const Eigen::Vector3d& position) {
+      for (const int64_t i : problem.OfPoint(k)) {
+        const Observation& o = problem.observations[i];
+        if (!(ViewPoint(cameras[o.view], o, position).depth > 0)) return false;
+      }
+      return true;
+    };
+    if (is_in_front(estimate->points[k])) return;
+    NearestPoint nearest;
+    for (const int64_t i : problem.OfPoint(k)) {
+      const Observation& o = problem.observations[i];
+      const AffineMap& camera = cameras[o.view];
+      const Eigen::Vector3d ray =
+          camera.leftCols<3>().transpose() * o.E.inverse().col(0);
+      nearest.Add(CentreOf(camera), ray.normalized(), 1);
+    }
+    const std::optional<Eigen::Vector3d> position = nearest.Solve();
+    if (position && is_in_front(*position)) estimate->points[k] = *position;
+  });
+}
+
 }  // namespace
+
+bool PlacePoints(const KnownRotationProblem& problem, Norm norm,
+                 const Context& context, double level, Estimate* estimate) {
+  PutInFront(problem, context, estimate);
+  BlockSweep blocks(problem, FastDescentOptions(), norm, context);
+  DescentGoal goal;
+  goal.level = level;
+  // Less than the share above which a working set takes points in
+  // (GrowWorkingSet).
+  goal.sufficient = 0.7 * level;
+  blocks.SetGoal(goal);
+  return std::isfinite(blocks.IntersectPoints(estimate));
+}
+
+bool ExtendSolution(const KnownRotationProblem& problem, Norm norm,
+                    const Context& context, double level, double highest,
+                    Estimate* estimate) {
+  if (!PlacePoints(problem, norm, context, level, estimate)) return false;
+  const auto excess = [&] {
+    return MaxOfRanks(context,
+                      Cost(problem, *estimate, norm, context.num_threads)) -
+           highest;
+  };
+  double left = excess();
+  if (left <= 0) return true;
+  // Blocks well below the highest cost allowed stay. Sweeps end where one takes
+  // less than a fifth off the excess.
+  BlockSweep blocks(problem, FastDescentOptions(), norm, context);
+  blocks.SetGoal({/*tolerance=*/1e-3, /*level=*/0.9 * highest});
+  for (int sweep = 0; sweep < 10; ++sweep) {
+    blocks.ResectFrames(estimate);
+    blocks.IntersectPoints(estimate);
+    const double before = std::exchange(left, excess());
+    if (left <= 0) return true;
+    if (left > 0.8 * before) return false;
+  }
+  return false;
+}
 
 ComponentSolve::ComponentSolve(const KnownRotationProblem& problem,
                                const JointOptions& options,
