@@ -133,11 +133,12 @@ struct Conventions {
 
 // The simplest conventions under which the model's tracks, or the matches of a
 // database if it has none, fit: their median error falls to a quarter or less
-// of what it is as COLMAP reads the model, and to a hundredth or less of the
-// photo's size. None for a model whose median error is within the 4 px to which
-// COLMAP's mapper filters, or that fits no other way. Poses of rigs with
-// several sensors are taken as they are. Requires a valid model. Milliseconds
-// for a sound model, up to a second otherwise.
+// of what it is as COLMAP reads the model, even with points where their images
+// see them, and to a hundredth or less of the photo's size; or points alone are
+// wrong, and with others it is within 4 px. None for a model whose median error
+// is within the 4 px to which COLMAP's mapper filters, or that fits no other
+// way. Poses of rigs with several sensors are taken as they are. Requires a
+// valid model. Milliseconds for a sound model, up to a second otherwise.
 std::optional<Conventions> FindConventions(const Model& model,
                                            const Database* database = nullptr,
                                            const Context& context = {});
@@ -303,6 +304,9 @@ struct ModelCheck {
   std::vector<WrongObservation> observations;
   std::vector<TwoPointTrack> tracks;
   std::vector<ModelPart> parts;  // the most images first
+  // Pairs of images that are the same photo, as they see most of their points
+  // at the same pixels: in `images`. Their observations count twice.
+  std::vector<std::array<int32_t, 2>> same_photos;
   // Positions of the points without wrong observations, as Model::points3D.
   std::vector<Eigen::Vector3d> points;
 

@@ -169,6 +169,12 @@ TEST(FindConventions, FindsPointsThatAreNotWhereImagesSeeThem) {
   EXPECT_LE(Summarize(PixelErrors(cured)).rms, before);
 }
 
+TEST(FindConventions, CallsPointsWrongOnlyOfSoundPoses) {
+  Model model = SceneOfColmap(6);
+  for (Camera& camera : model.cameras) camera.params[0] *= 1.2;
+  EXPECT_FALSE(FindConventions(model));
+}
+
 // As for triangulation with known poses.
 TEST(FindConventions, AsksTheMatchesWhereThereAreNoTracks) {
   const Model model = SceneOfColmap(5);

@@ -1,6 +1,7 @@
 #include "krot/check.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -561,6 +562,44 @@ TEST(CheckModel, HasNoVerdictWithoutPositions) {
   const ModelCheck check = CheckModel(model);
   EXPECT_FALSE(check.sigma_px);
   EXPECT_FALSE(check.IsAnythingWrong());
+}
+
+TEST(CheckModel, NamesPairsOfImagesThatAreTheSamePhoto) {
+  Model model = Scene(1);
+  EXPECT_THAT(CheckModel(model).same_photos, IsEmpty());
+  // Image 3 becomes a copy of image 5.
+  Model copy = model;
+  copy.track_elements.clear();
+  copy.images[3].points2D = model.images[5].points2D;
+  for (Point3D& point : copy.points3D) {
+    const Track track = TrackOf(model, point);
+    point.track_begin = copy.track_elements.size();
+    for (const TrackElement& element : track) {
+      if (element.image_id == model.images[3].id) continue;
+      copy.track_elements.push_back(element);
+      if (element.image_id != model.images[5].id) continue;
+      copy.track_elements.push_back({model.images[3].id, element.point2D_idx});
+    }
+    point.track_end = copy.track_elements.size();
+  }
+  FrameOf(&copy, 3).rig_from_world = FrameOf(&copy, 5).rig_from_world;
+  const ModelCheck check = CheckModel(copy);
+  EXPECT_THAT(check.same_photos, ElementsAre(std::array<int32_t, 2>{3, 5}));
+  EXPECT_EQ(check.NumImages(ImageVerdict::kWrong), 0);
+}
+
+TEST(CheckModel, FindsImagesThatAreFarOffAmongAQuarterOfAll) {
+  for (int seed = 1; seed <= 5; ++seed) {
+    Model model = Scene(seed, 12, 5);
+    for (const size_t n : {2, 6, 9}) {
+      FrameOf(&model, n).rig_from_world = {};
+    }
+    const ModelCheck check = CheckModel(model);
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+                ElementsAre(model.images[2].id, model.images[6].id,
+                            model.images[9].id));
+    EXPECT_NEAR(*check.sigma_px, 1, 0.1);
+  }
 }
 
 TEST(CheckModel, HasTheSameBitsAtAnyNumberOfThreads) {

@@ -82,7 +82,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 // One has points in cameras, one several optima at a fold of its lens, and of
 // one a fifth of the cameras is within a millionth of the others' distances.
-TEST(SolveModel, ProvesHardRealModelsWithinSeventyIterations) {
+TEST(SolveModel, ProvesHardRealModelsWithinEightyIterations) {
   const char* root = std::getenv("KROT_REAL_MODELS");
   if (root == nullptr) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
   for (const char* name : {"drone72_rig", "bandgap10", "hard_endo"}) {
@@ -92,7 +92,7 @@ TEST(SolveModel, ProvesHardRealModelsWithinSeventyIterations) {
         SolveModel(ReadModel(folder, DetectModelFormat(folder)), {}).summary;
     ASSERT_TRUE(summary.is_certified);
     EXPECT_GE(*summary.lower_bound, 0.9999 * summary.LowestCost());
-    EXPECT_LE(summary.iterations.size(), 70u);
+    EXPECT_LE(summary.iterations.size(), 80u);
   }
 }
 

@@ -7,11 +7,12 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/analysis/epipolar.h"
+#include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
 #include "krot/check.h"
+#include "krot/geometry/transform.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 
@@ -21,9 +22,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// COLMAP's mapper keeps no observation with a larger error, pixels
-// (Mapper.filter_max_reproj_error).
-constexpr double kFilteredPx = 4;
 // The right reading lowers the median error of a wrong model by more than this
 // factor; so do some of the many wrong ones, by chance, but not to less than
 // this share of the photo's size. Poses from a phone's sensors are as good.
@@ -159,14 +157,20 @@ class ConventionSearch {
           return !one.has_pose || one.cam_from_world.translation.isZero();
         });
     if (is_in_one_place) return std::nullopt;
-    const double as_read = MedianErrorAsRead();
+    // With points where their images see them, and as they stand.
+    const double seen = MedianErrorWhereSeen({}, RaysIn({}));
+    const double as_read =
+        places_.empty() ? seen
+                        : MedianError(model_.cameras, Poses({}),
+                                      [&](size_t k) { return places_[k]; });
     if (as_read <= kFilteredPx) return std::nullopt;
     for (const Conventions& intrinsics : AllIntrinsics()) {
       Conventions best = Simplest(MeasureAll(intrinsics, context));
-      if (best.median_error_px > kFits * largest_px_ ||
-          best.median_error_px > as_read / kClearly) {
-        continue;
-      }
+      // If points alone are wrong, the poses are as good as COLMAP's.
+      const double limit = NumDifferences(best) == 0
+                               ? kFilteredPx
+                               : std::min(kFits * largest_px_, seen / kClearly);
+      if (best.median_error_px > std::min(limit, as_read / kClearly)) continue;
       best.median_error_as_read_px = as_read;
       best.has_wrong_points = HasWrongPoints(best);
       return best;
@@ -175,12 +179,6 @@ class ConventionSearch {
   }
 
  private:
-  double MedianErrorAsRead() const {
-    if (places_.empty()) return MedianErrorWhereSeen({}, RaysIn({}));
-    return MedianError(model_.cameras, Poses({}),
-                       [&](size_t k) { return places_[k]; });
-  }
-
   // Points may be right where poses are read wrongly.
   bool HasWrongPoints(const Conventions& from) const {
     if (places_.empty()) return false;
@@ -188,7 +186,7 @@ class ConventionSearch {
       return std::optional(from.is_left_handed ? Vector3d(kMirror * *places_[k])
                                                : *places_[k]);
     });
-    return error > kFilteredPx && error > kClearly * from.median_error_px;
+    return error > std::max(kFilteredPx, kClearly * from.median_error_px);
   }
 
   std::optional<Sight> SightOf(int32_t image, const Eigen::Vector2d& pixel) {

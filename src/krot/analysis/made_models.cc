@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/analysis/noise.h"
 #include "krot/check.h"
 #include "krot/context.h"
 #include "krot/model.h"
@@ -271,6 +272,18 @@ Model Removed(const Model& model, const ModelCheck& check,
 }
 
 }  // namespace
+
+ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
+                      const Context& context) {
+  const auto conventions = FindConventions(model, options.database, context);
+  ModelCheck check =
+      conventions ? CheckConverted(ConvertModel(model, *conventions, context),
+                                   options, context)
+                  : CheckConverted(model, options, context);
+  check.conventions = conventions;
+  check.same_photos = FindSamePhotos(model);
+  return check;
+}
 
 ModelCure CureModel(const Model& model, const ModelCheck& check,
                     const ModelCheckOptions& options, const Context& context) {

@@ -387,14 +387,13 @@ int64_t ModelCheck::NumImages(ImageVerdict verdict) const {
       [&](const ImageCheck& image) { return image.verdict == verdict; });
 }
 
-ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
-                      const Context& context) {
-  const auto conventions = FindConventions(model, options.database, context);
-  if (!conventions) return Checker(model, options, context).Run();
-  const Model converted = ConvertModel(model, *conventions, context);
-  ModelCheck check = Checker(converted, options, context).Run();
-  check.conventions = conventions;
-  return check;
+}  // namespace krot
+
+namespace krot::internal {
+
+ModelCheck CheckConverted(const Model& model, const ModelCheckOptions& options,
+                          const Context& context) {
+  return Checker(model, options, context).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -24,6 +24,8 @@ constexpr Chi2Quantile kMedian = {0.5,
                                   {0, 0.4549364231195724, 1.3862943611198906}};
 constexpr Chi2Quantile kUpperQuartile = {
     0.75, {0, 1.3233036969314664, 2.772588722239781}};
+constexpr Chi2Quantile kLowestDecile = {
+    0.1, {0, 0.015790774093431218, 0.21072103131565267}};
 
 void CheckOptions(const Model& model, const NoiseOptions& options) {
   CheckArgument(options.false_alarm > 0 && options.false_alarm < 1,
@@ -269,6 +271,17 @@ NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
     return static_cast<int64_t>(one.removed.size()) <= half;
   };
   NoiseSnooping result = by_median.Snoop();
+  if (result.noise.sigma_px.value_or(0) > kFilteredPx) {
+    // Either the model is not adjusted, or images that are far off bend most
+    // tracks. Then what the other tracks are within agrees with most of the
+    // rest.
+    NoiseSnooping least =
+        Snooper(model, options, context, kLowestDecile).Snoop();
+    if (is_most_left(least) &&
+        *least.noise.sigma_px < *result.noise.sigma_px / 4) {
+      return least;
+    }
+  }
   if (is_most_left(result)) return result;
   // Then sigma has followed the removals down, as the median does where errors
   // have no common size. A higher quantile follows less, and finds nothing more

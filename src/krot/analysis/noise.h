@@ -17,6 +17,10 @@ namespace krot::internal {
 // floats.
 inline constexpr double kLeastNoisePx = 1e-3;
 
+// COLMAP's mapper keeps no observation with a larger error
+// (Mapper.filter_max_reproj_error), pixels.
+inline constexpr double kFilteredPx = 4;
+
 // An observation that is no noise.
 struct SnoopedObservation {
   uint64_t element = 0;  // in Model::track_elements
@@ -229,6 +233,13 @@ double SuccessExponent(int64_t num_successes, int64_t num_trials, double p);
 // The sums of each image, over the observations that are tested according to
 // `noise`. Requires a valid model. O(observations).
 std::vector<ImageSums> AddUpImages(const Model& model, const ModelNoise& noise);
+
+// CheckModel of a model in COLMAP's conventions.
+ModelCheck CheckConverted(const Model& model, const ModelCheckOptions& options,
+                          const Context& context);
+
+// As ModelCheck::same_photos. O(observations log(longest track)).
+std::vector<std::array<int32_t, 2>> FindSamePhotos(const Model& model);
 
 // ---- Parts ----
 

@@ -91,7 +91,7 @@ bool PlacePoints(const KnownRotationProblem& problem, Norm norm,
   DescentGoal goal;
   goal.level = level;
   // Less than the share above which a working set takes points in
-  // (GrowWorkingSet).
+  // (ComponentSolve::Run).
   goal.sufficient = 0.7 * level;
   blocks.SetGoal(goal);
   return std::isfinite(blocks.IntersectPoints(estimate));

@@ -328,10 +328,25 @@ std::string ConvertedSentence(const CheckReport& report) {
 
 std::string CheckSentence(const CheckReport& report) {
   const auto& conventions = report.check.conventions;
-  return (conventions ? ConventionsSentence(*conventions) + " Once converted: "
-                      : "") +
+  return (conventions
+              ? ConventionsSentence(*conventions) + " Once that is put right: "
+              : "") +
          ConvertedSentence(report);
 }
+
+namespace {
+
+std::string SamePhotosSentence(const ModelCheck& check) {
+  if (check.same_photos.empty()) return "";
+  const auto [first, second] = check.same_photos.front();
+  const size_t num_more = check.same_photos.size() - 1;
+  return check.images[first].name + " and " + check.images[second].name +
+         " are the same photo" +
+         TextIf(num_more > 0, ", as are " + Counted(num_more, "other pair")) +
+         ": the observations count twice, so remove one of the two.\n";
+}
+
+}  // namespace
 
 std::string CheckTable(const CheckReport& report, int max_rows) {
   const ModelCheck& check = report.check;
@@ -343,6 +358,7 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
       " weakly held, " + Thousands(check.NumImages(ImageVerdict::kFine)) +
       " fine. Observations that others check: " + Thousands(check.num_tested) +
       ".\n";
+  text += SamePhotosSentence(check);
   if (!check.parts.empty()) text += PartsSentence(check) + "\n";
   if (!check.is_adjusted && check.cameras.empty()) {
     text +=

@@ -1,5 +1,6 @@
 #include "krot/report/reports.h"
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -192,7 +193,9 @@ std::string ConventionsSentence(const Conventions& one) {
   return (is_read_otherwise
               ? "The model is not in COLMAP's conventions, but has "
               : "The model has ") +
-         ConventionWords(one) + ": converted, its median error falls from " +
+         ConventionWords(one) +
+         (is_read_otherwise ? ": converted, its" : ": with others, the") +
+         " median error falls from " +
          FormatNumber(one.median_error_as_read_px, 2) + " to " +
          Pixels(one.median_error_px, 2) + ".";
 }
@@ -333,6 +336,12 @@ std::string CheckJson(const CheckReport& report) {
       {"images", ListJson(check.images, of_image)},
       {"observations", ListJson(check.observations, of_observation)},
       {"tracks", ListJson(check.tracks, TwoPointsJson)},
+      {"same_photos", ListJson(check.same_photos,
+                               [&](const std::array<int32_t, 2>& pair) {
+                                 return ListJson(pair, [&](int32_t n) {
+                                   return check.images[n].name;
+                                 });
+                               })},
       {"parts_sentence", PartsSentence(check)},
       {"parts", PartsJson(check)},
   };
