@@ -96,7 +96,7 @@ TEST_F(ModelCheckerCommand, ConvertsAModelThatIsNotInColmapsConventions) {
 
   const KrotResult solved =
       RunKrot({"solver", "--input_path", folder_ / "gl", "--output_path",
-               folder_ / "solved", "--Solver.method", "sweeps"});
+               folder_ / "solved", "--Solver.method", "res_int"});
   EXPECT_THAT(solved.err,
               HasSubstr("is not in COLMAP's conventions, but has poses"));
 }
