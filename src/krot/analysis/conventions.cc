@@ -136,6 +136,8 @@ struct Sight {
   Eigen::Vector2d pixel;
 };
 
+// Reads a sample of a model's tracks, or of a database's matches, as different
+// programs would have written the model.
 class ConventionSearch {
  public:
   ConventionSearch(const Model& model, const Database* database)
