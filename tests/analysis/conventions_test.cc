@@ -156,6 +156,19 @@ TEST(FindConventions, FindsIntrinsicsOfPhotosOfAnotherSize) {
   }
 }
 
+TEST(FindConventions, FindsHowPosesOfPanoramasAreWritten) {
+  SceneOptions options = SceneOf(12, 200, 4, 0.5, 1);
+  options.camera_model_id = 17;  // EQUIRECTANGULAR
+  const Model model = SynthesizeScene(options).model;
+  for (const Program& program : Programs()) {
+    SCOPED_TRACE(program.name);
+    const auto found = FindConventions(WrittenBy(program, model));
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->is_world_from_cam, program.writes_camera_to_world);
+    EXPECT_EQ(found->is_left_handed, program.axes.determinant() < 0);
+  }
+}
+
 TEST(FindConventions, FindsPointsThatAreNotWhereImagesSeeThem) {
   Model model = SceneOfColmap(4);
   const double before = Summarize(PixelErrors(model)).rms;

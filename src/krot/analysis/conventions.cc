@@ -119,10 +119,10 @@ Camera ConvertCamera(const Camera& camera, const Conventions& from) {
   return converted;
 }
 
-void AddRay(const RigidTransform& cam_from_world, const Vector3d& ray,
-            NearestPoint* nearest) {
+void AddBearing(const RigidTransform& cam_from_world, const Vector3d& bearing,
+                NearestPoint* nearest) {
   nearest->Add(Center(cam_from_world),
-               cam_from_world.rotation.transpose() * ray.normalized(), 1);
+               cam_from_world.rotation.transpose() * bearing, 1);
 }
 
 Eigen::Vector2d PixelOf(const Model& model, int32_t image, uint64_t e) {
@@ -160,7 +160,7 @@ class ConventionSearch {
         });
     if (is_in_one_place) return std::nullopt;
     // With points where their images see them, and as they stand.
-    const double seen = MedianErrorWhereSeen({}, RaysIn({}));
+    const double seen = MedianErrorWhereSeen({}, BearingsIn({}));
     const double as_read =
         places_.empty() ? seen
                         : MedianError(model_.cameras, Poses({}),
@@ -255,13 +255,13 @@ class ConventionSearch {
 
   std::vector<Conventions> MeasureAll(const Conventions& intrinsics,
                                       const Context& context) const {
-    const Rays rays = RaysIn(intrinsics);
+    const Bearings bearings = BearingsIn(intrinsics);
     std::vector<Conventions> all =
         has_own_poses_ ? AllPoses(intrinsics) : std::vector{intrinsics};
     ParallelForEach(
         static_cast<int64_t>(all.size()), context.num_threads,
         [&](int64_t n) {
-          all[n].median_error_px = MedianErrorWhereSeen(all[n], rays);
+          all[n].median_error_px = MedianErrorWhereSeen(all[n], bearings);
         },
         /*chunk_size=*/16);
     return all;
@@ -285,27 +285,27 @@ class ConventionSearch {
   }
 
   // Of all tracks' pixels, in camera axes; none where the lens has none.
-  using Rays = std::vector<std::vector<std::optional<Vector3d>>>;
-  Rays RaysIn(const Conventions& from) const {
+  using Bearings = std::vector<std::vector<std::optional<Vector3d>>>;
+  Bearings BearingsIn(const Conventions& from) const {
     const std::vector<Camera> cameras = Cameras(from);
-    Rays rays;
+    Bearings bearings;
     for (const std::vector<Sight>& track : tracks_) {
-      auto& of_track = rays.emplace_back();
+      auto& of_track = bearings.emplace_back();
       for (const Sight& sight : track) {
-        const auto ray = RayOf(CameraOf(sight, cameras), sight.pixel);
-        of_track.push_back(ray ? std::optional(ray->ray) : std::nullopt);
+        of_track.push_back(PixelBearing(CameraOf(sight, cameras), sight.pixel));
       }
     }
-    return rays;
+    return bearings;
   }
 
-  double MedianErrorWhereSeen(const Conventions& from, const Rays& rays) const {
+  double MedianErrorWhereSeen(const Conventions& from,
+                              const Bearings& bearings) const {
     const std::vector<RigidTransform> poses = Poses(from);
     return MedianError(Cameras(from), poses, [&](size_t k) {
       NearestPoint nearest;
       for (size_t i = 0; i < tracks_[k].size(); ++i) {
-        if (!rays[k][i]) return std::optional<Vector3d>();
-        AddRay(poses[tracks_[k][i].image], *rays[k][i], &nearest);
+        if (!bearings[k][i]) return std::optional<Vector3d>();
+        AddBearing(poses[tracks_[k][i].image], *bearings[k][i], &nearest);
       }
       return nearest.Solve();
     });
@@ -386,9 +386,9 @@ Model ConvertModel(const Model& model, const Conventions& from,
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
       const ImageGeometry& geometry = geometries[image_of[e]];
       if (!geometry.has_pose) continue;
-      const auto ray = RayOf(converted.cameras[geometry.camera],
-                             PixelOf(converted, image_of[e], e));
-      if (ray) AddRay(geometry.cam_from_world, ray->ray, &nearest);
+      const auto bearing = PixelBearing(converted.cameras[geometry.camera],
+                                        PixelOf(converted, image_of[e], e));
+      if (bearing) AddBearing(geometry.cam_from_world, *bearing, &nearest);
     }
     point.xyz = nearest.Solve().value_or(point.xyz);
   }
