@@ -291,6 +291,7 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
 void WarnOfConventions(const ModelPaths& paths, const Model& model,
                        const LogOptions& log) {
   if (!paths.rotations_path.empty()) return;
+  BeginPhase(log, "asking how its poses are written");
   const auto conventions = FindConventions(model);
   if (!conventions) return;
   LogLine(log, 0,

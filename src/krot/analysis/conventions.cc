@@ -1,7 +1,7 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -33,16 +33,15 @@ constexpr int64_t kNumTracks = 200;
 // The rotations that take axes to axes.
 std::vector<Matrix3d> AxisRotations() {
   std::vector<Matrix3d> rotations;
-  std::array<int, 3> order = {0, 1, 2};
-  do {
-    for (int signs = 0; signs < 8; ++signs) {
-      Matrix3d rotation = Matrix3d::Zero();
-      for (int j = 0; j < 3; ++j) {
-        rotation(order[j], j) = (signs >> j & 1) != 0 ? -1 : 1;
+  for (const int i : {0, 1, 2}) {
+    for (const int j : {(i + 1) % 3, (i + 2) % 3}) {
+      for (const int signs : {0, 1, 2, 3}) {
+        const Vector3d x = ((signs & 1) != 0 ? -1 : 1) * Vector3d::Unit(i);
+        const Vector3d y = ((signs & 2) != 0 ? -1 : 1) * Vector3d::Unit(j);
+        rotations.emplace_back() << x, y, x.cross(y);
       }
-      if (rotation.determinant() > 0) rotations.push_back(rotation);
     }
-  } while (std::next_permutation(order.begin(), order.end()));
+  }
   return rotations;
 }
 
@@ -104,12 +103,8 @@ Camera ConvertCamera(const Camera& camera, const Conventions& from) {
   const CameraModelInfo& info = *FindCameraModel(camera.model_id);
   if (!info.has_image_plane) return camera;
   const double factor = from.intrinsics_factor;
-  const auto scaled = [&](uint64_t length) {
-    return static_cast<uint64_t>(
-        std::llround(factor * static_cast<double>(length)));
-  };
-  converted.width = scaled(camera.width);
-  converted.height = scaled(camera.height);
+  converted.width = std::llround(factor * static_cast<double>(camera.width));
+  converted.height = std::llround(factor * static_cast<double>(camera.height));
   const size_t center = info.param_names.substr(0, 2) == "fx" ? 2 : 1;
   for (size_t i = 0; i < center + 2; ++i) converted.params[i] *= factor;
   if (from.has_central_principal_point) {
@@ -160,14 +155,14 @@ class ConventionSearch {
         });
     if (is_in_one_place) return std::nullopt;
     // With points where their images see them, and as they stand.
-    const double seen = MedianErrorWhereSeen({}, BearingsIn({}));
+    const double seen = MedianErrorWhereSeen({}, LensesIn({}));
     const double as_read =
         places_.empty() ? seen
                         : MedianError(model_.cameras, Poses({}),
                                       [&](size_t k) { return places_[k]; });
     if (as_read <= kFilteredPx) return std::nullopt;
     for (const Conventions& intrinsics : AllIntrinsics()) {
-      Conventions best = Simplest(MeasureAll(intrinsics, context));
+      Conventions best = SimplestOfBest(MeasureAll(intrinsics, context));
       // If points alone are wrong, the poses are as good as COLMAP's.
       const double limit = NumDifferences(best) == 0
                                ? kFilteredPx
@@ -194,6 +189,7 @@ class ConventionSearch {
   std::optional<Sight> SightOf(int32_t image, const Eigen::Vector2d& pixel) {
     if (!geometries_[image].has_pose) return std::nullopt;
     largest_px_ = std::fmax(largest_px_, pixel.cwiseAbs().maxCoeff());
+    images_.insert(image);
     return Sight{image, pixel};
   }
 
@@ -220,11 +216,11 @@ class ConventionSearch {
     for (const VerifiedPair& pair : database.pairs) {
       num += static_cast<int64_t>(pair.matches.size());
     }
-    int64_t taken = 0, passed = 0;
+    const int64_t step = num / kNumTracks + 1;
+    int64_t passed = 0;
     for (const VerifiedPair& pair : database.pairs) {
       for (const auto& match : pair.matches) {
-        if (taken * num > kNumTracks * passed++) continue;
-        ++taken;
+        if (passed++ % step != 0) continue;
         const auto first =
             SightOf(pair.image1, database.keypoints[pair.image1][match[0]]);
         const auto second =
@@ -234,13 +230,15 @@ class ConventionSearch {
     }
   }
 
+  // Of the images that see tracks; all others are left at the identity.
   std::vector<RigidTransform> Poses(const Conventions& from) const {
-    std::vector<RigidTransform> poses;
-    for (const ImageGeometry& geometry : geometries_) {
-      poses.push_back(
-          has_own_poses_ && geometry.has_pose
-              ? ConvertPose(model_.frames[geometry.frame].rig_from_world, from)
-              : geometry.cam_from_world);
+    std::vector<RigidTransform> poses(geometries_.size());
+    for (const int32_t n : images_) {
+      poses[n] =
+          has_own_poses_
+              ? ConvertPose(model_.frames[geometries_[n].frame].rig_from_world,
+                            from)
+              : geometries_[n].cam_from_world;
     }
     return poses;
   }
@@ -255,24 +253,22 @@ class ConventionSearch {
 
   std::vector<Conventions> MeasureAll(const Conventions& intrinsics,
                                       const Context& context) const {
-    const Bearings bearings = BearingsIn(intrinsics);
+    const Lenses lenses = LensesIn(intrinsics);
     std::vector<Conventions> all =
         has_own_poses_ ? AllPoses(intrinsics) : std::vector{intrinsics};
     ParallelForEach(
         static_cast<int64_t>(all.size()), context.num_threads,
         [&](int64_t n) {
-          all[n].median_error_px = MedianErrorWhereSeen(all[n], bearings);
+          all[n].median_error_px = MedianErrorWhereSeen(all[n], lenses);
         },
         /*chunk_size=*/16);
     return all;
   }
 
-  // Of those that fit best.
-  static Conventions Simplest(const std::vector<Conventions>& all) {
+  static Conventions SimplestOfBest(const std::vector<Conventions>& all) {
     double lowest = kInfinity;
-    for (const Conventions& one : all) {
+    for (const Conventions& one : all)
       lowest = std::min(lowest, one.median_error_px);
-    }
     const Conventions* simplest = nullptr;
     for (const Conventions& one : all) {
       if (one.median_error_px > 2 * lowest) continue;
@@ -284,28 +280,32 @@ class ConventionSearch {
     return *simplest;
   }
 
-  // Of all tracks' pixels, in camera axes; none where the lens has none.
-  using Bearings = std::vector<std::vector<std::optional<Vector3d>>>;
-  Bearings BearingsIn(const Conventions& from) const {
-    const std::vector<Camera> cameras = Cameras(from);
-    Bearings bearings;
+  struct Lenses {
+    std::vector<Camera> cameras;
+    // Of all tracks' pixels, in camera axes; none where the lens has none.
+    std::vector<std::vector<std::optional<Vector3d>>> bearings;
+  };
+  Lenses LensesIn(const Conventions& from) const {
+    Lenses lenses = {Cameras(from), {}};
     for (const std::vector<Sight>& track : tracks_) {
-      auto& of_track = bearings.emplace_back();
+      auto& bearings = lenses.bearings.emplace_back();
       for (const Sight& sight : track) {
-        of_track.push_back(PixelBearing(CameraOf(sight, cameras), sight.pixel));
+        bearings.push_back(
+            PixelBearing(CameraOf(sight, lenses.cameras), sight.pixel));
       }
     }
-    return bearings;
+    return lenses;
   }
 
   double MedianErrorWhereSeen(const Conventions& from,
-                              const Bearings& bearings) const {
+                              const Lenses& lenses) const {
     const std::vector<RigidTransform> poses = Poses(from);
-    return MedianError(Cameras(from), poses, [&](size_t k) {
+    return MedianError(lenses.cameras, poses, [&](size_t k) {
       NearestPoint nearest;
       for (size_t i = 0; i < tracks_[k].size(); ++i) {
-        if (!bearings[k][i]) return std::optional<Vector3d>();
-        AddBearing(poses[tracks_[k][i].image], *bearings[k][i], &nearest);
+        const std::optional<Vector3d>& bearing = lenses.bearings[k][i];
+        if (!bearing) return std::optional<Vector3d>();
+        AddBearing(poses[tracks_[k][i].image], *bearing, &nearest);
       }
       return nearest.Solve();
     });
@@ -341,7 +341,8 @@ class ConventionSearch {
   // Whether each frame is one image, so that its pose can be read otherwise.
   bool has_own_poses_ = true;
   std::vector<std::vector<Sight>> tracks_;
-  double largest_px_ = 0;  // coordinate of a pixel
+  std::set<int32_t> images_;  // that see them
+  double largest_px_ = 0;     // coordinate of a pixel
   // Of the points, in the model as it stands; empty for matches.
   std::vector<std::optional<Vector3d>> places_;
 };
