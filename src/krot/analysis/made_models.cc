@@ -273,6 +273,12 @@ Model Removed(const Model& model, const ModelCheck& check,
 
 }  // namespace
 
+int64_t ModelCheck::NumImages(ImageVerdict verdict) const {
+  return std::count_if(
+      images.begin(), images.end(),
+      [&](const ImageCheck& image) { return image.verdict == verdict; });
+}
+
 ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
                       const Context& context) {
   const auto conventions = FindConventions(model, options.database, context);

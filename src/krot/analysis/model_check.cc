@@ -12,10 +12,7 @@
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 
-namespace krot {
-
-using namespace internal;
-
+namespace krot::internal {
 namespace {
 
 // Relative to the median image's standard deviation.
@@ -48,19 +45,24 @@ class Checker {
       check_.points.push_back(point.xyz);
     if (options_.database != nullptr) AskMatches();
     bool judges_cameras = true;
-    do {
-      snooping_ = SnoopNoise(model_, noise_options_, context_);
+    for (;;) {
+      // A wrong camera's images must not be taken for images far off.
+      snooping_ = SnoopNoise(model_, noise_options_, context_, !judges_cameras);
       if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
-      // Images that go must not change what is taken for noise.
-      if (!snooping_.has_common_noise) {
-        noise_options_.sigma_px = snooping_.noise.sigma_px;
-      }
       Count();
       sums_ = AddUpImages(model_, snooping_.noise);
       check_.is_adjusted = IsAdjusted();
-      if (judges_cameras) JudgeCameras();
-      judges_cameras = !check_.cameras.empty();
-    } while (CallWrong(WorstImage()) || CallUnsupported());
+      if (judges_cameras) {
+        JudgeCameras();
+        judges_cameras = !check_.cameras.empty();
+        const bool is_above_filter = *snooping_.noise.sigma_px > kFilteredPx;
+        if (is_above_filter && !judges_cameras) continue;
+      }
+      // Images that go must not change what is taken for noise.
+      if (!snooping_.has_common_noise)
+        noise_options_.sigma_px = snooping_.noise.sigma_px;
+      if (!CallWrong(WorstImage()) && !CallUnsupported()) break;
+    }
     const int64_t num_wrong = check_.NumImages(ImageVerdict::kWrong);
     if (num_wrong > 0 && !judges_cameras) JudgeCameras();
     Describe();
@@ -380,16 +382,6 @@ class Checker {
 };
 
 }  // namespace
-
-int64_t ModelCheck::NumImages(ImageVerdict verdict) const {
-  return std::count_if(
-      images.begin(), images.end(),
-      [&](const ImageCheck& image) { return image.verdict == verdict; });
-}
-
-}  // namespace krot
-
-namespace krot::internal {
 
 ModelCheck CheckConverted(const Model& model, const ModelCheckOptions& options,
                           const Context& context) {

@@ -263,7 +263,7 @@ double StandardizedError(double chi2, int num_directions) {
 }
 
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
-                         const Context& context) {
+                         const Context& context, bool may_be_bent) {
   CheckOptions(model, options);
   Snooper by_median(model, options, context);
   const int64_t half = by_median.noise().num_tested / 2;
@@ -271,7 +271,7 @@ NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
     return static_cast<int64_t>(one.removed.size()) <= half;
   };
   NoiseSnooping result = by_median.Snoop();
-  if (result.noise.sigma_px.value_or(0) > kFilteredPx) {
+  if (may_be_bent && result.noise.sigma_px.value_or(0) > kFilteredPx) {
     // Either the model is not adjusted, or images that are far off bend most
     // tracks. Then what the other tracks are within agrees with most of the
     // rest.

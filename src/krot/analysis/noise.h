@@ -69,9 +69,12 @@ double CriticalW(int64_t num_tested, double false_alarm,
 // and the critical value are measured anew, until nothing is above. The removal
 // of the largest w lowers the track's sum of squares most, so that a wrong
 // observation goes before the sound ones that it bends. Of a track of two both
-// go. Requires and throws what EstimateNoise does.
+// go. `may_be_bent`: a sigma above COLMAP's filter may come from images far
+// off that bend most tracks; then the lowest decile of the errors sets it, if
+// that is clearly less and most observations agree with it. Requires and throws
+// what EstimateNoise does.
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
-                         const Context& context);
+                         const Context& context, bool may_be_bent = true);
 
 // The error of an observation that sees x_cam, in camera axes, and its
 // derivatives by x_cam.
