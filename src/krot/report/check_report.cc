@@ -303,10 +303,6 @@ std::string ForAdjusted(const CheckReport& report) {
          Counted(parts.size(), "part", "is", "are") + " loose.";
 }
 
-}  // namespace
-
-namespace {
-
 std::string ConvertedSentence(const CheckReport& report) {
   const ModelCheck& check = report.check;
   if (check.is_adjusted) return ForAdjusted(report);
