@@ -27,8 +27,7 @@ using Eigen::Vector3d;
 // this share of the photo's size. Poses from a phone's sensors are as good.
 constexpr double kClearly = 4;
 constexpr double kFits = 0.01;
-// Tracks that are asked, evenly spread.
-constexpr int64_t kNumTracks = 200;
+constexpr int64_t kNumTracks = 200;  // that are asked, evenly spread
 
 // The rotations that take axes to axes.
 std::vector<Matrix3d> AxisRotations() {
@@ -140,9 +139,8 @@ class ConventionSearch {
     std::vector<int> num_images(model.frames.size(), 0);
     for (const ImageGeometry& geometry : geometries_) {
       if (!geometry.has_pose) continue;
-      has_own_poses_ = has_own_poses_ && ++num_images[geometry.frame] == 1 &&
-                       geometry.cam_from_rig.rotation.isIdentity() &&
-                       geometry.cam_from_rig.translation.isZero();
+      has_own_poses_ = has_own_poses_ && geometry.sensor < 0 &&
+                       ++num_images[geometry.frame] == 1;
     }
     TakeTracks();
     if (tracks_.empty() && database != nullptr) TakeMatches(*database);
@@ -167,10 +165,12 @@ class ConventionSearch {
       const double limit = NumDifferences(best) == 0
                                ? kFilteredPx
                                : std::min(kFits * largest_px_, seen / kClearly);
-      if (best.median_error_px > std::min(limit, as_read / kClearly)) continue;
-      best.median_error_as_read_px = as_read;
-      best.has_wrong_points = HasWrongPoints(best);
-      return best;
+      if (best.median_error_px <= std::min(limit, as_read / kClearly)) {
+        best.median_error_as_read_px = as_read;
+        best.has_wrong_points = HasWrongPoints(best);
+        return best;
+      }
+      if (seen <= kFits * largest_px_) break;  // wrong intrinsics do worse
     }
     return std::nullopt;
   }
