@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/analysis/model_input.h"
 #include "krot/analysis/noise.h"
 #include "krot/check.h"
 #include "krot/context.h"

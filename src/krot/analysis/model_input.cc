@@ -12,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/noise.h"
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/context.h"

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -33,6 +34,9 @@ namespace krot::internal {
 // of a model that contradicts itself. O(size of the model).
 Contradictions SettleContradictions(const std::string& on_contradiction,
                                     Model* model);
+
+// As ModelCheck::same_photos. O(observations log(longest track)).
+std::vector<std::array<int32_t, 2>> FindSamePhotos(const Model& model);
 
 // Whether a change of positions made the images' side of a model worse that
 // contradicts itself: its largest errors before and after, pixels in the

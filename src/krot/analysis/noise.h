@@ -241,9 +241,6 @@ std::vector<ImageSums> AddUpImages(const Model& model, const ModelNoise& noise);
 ModelCheck CheckConverted(const Model& model, const ModelCheckOptions& options,
                           const Context& context);
 
-// As ModelCheck::same_photos. O(observations log(longest track)).
-std::vector<std::array<int32_t, 2>> FindSamePhotos(const Model& model);
-
 // ---- Parts ----
 
 // What no adjustment of a model mends.
