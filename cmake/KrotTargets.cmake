@@ -93,7 +93,7 @@ endfunction()
 #
 # Adds source files that are compiled for other vector units than the rest: for
 # the machine's at hand with KROT_NATIVE, else on x86 once for each of
-# krot/base/vector_units.h, which chooses. They must have no Eigen type in their
+# krot/base/system.h, which chooses. They must have no Eigen type in their
 # interface: vector flags would change their alignment and so the ABI. Nor may
 # functions of one name be left in several of them: all of theirs are in a
 # namespace KROT_UNITS, and Eigen is called KrotEigen_<units>.

@@ -104,10 +104,9 @@ ModelNoise EstimateNoise(const Model& model, const NoiseOptions& options = {},
 
 // ---- Conventions ----
 
-// How a model's numbers differ from COLMAP's, because they come from a program
-// that writes the same things otherwise. The default is COLMAP's own way:
-// cam_from_world with w first, camera axes x right, y down, z forward.
-struct Conventions {
+// How poses are written, if not as COLMAP does it. The default is COLMAP's own
+// way: cam_from_world with w first, camera axes x right, y down, z forward.
+struct PoseConventions {
   bool has_w_last = false;         // quaternions are x, y, z, w
   bool is_world_from_cam = false;  // rotations take camera to world
   bool has_centers = false;        // translations are the cameras' centres
@@ -115,6 +114,25 @@ struct Conventions {
   // Takes the file's camera axes to COLMAP's; if they are left-handed, once
   // their y has been turned round.
   Eigen::Matrix3d cam_from_file_axes = Eigen::Matrix3d::Identity();
+
+  // All that are tried, COLMAP's own first.
+  static std::vector<PoseConventions> All();
+
+  // How many things differ from COLMAP's: the order of quaternions, the
+  // direction, the axes.
+  int NumDifferences() const;
+};
+
+// How a model's numbers differ from COLMAP's, because they come from a program
+// that writes the same things otherwise.
+struct Conventions {
+  PoseConventions poses;  // of images; in rigs, those of frames
+  // Of the other sensors in a rig, which is their world; it has the file's
+  // camera axes, too.
+  PoseConventions sensors;
+  // What translations of sensors must be multiplied by, as rigs are written in
+  // another unit than the world.
+  double rig_factor = 1;
   // What focal lengths, principal points and image sizes must be multiplied by,
   // as they are those of photos of another size than the 2D points.
   double intrinsics_factor = 1;
@@ -124,11 +142,20 @@ struct Conventions {
 
   // Median reprojection errors of a sample of the model's tracks, pixels: as it
   // stands, and so converted, with points where their images see them. No error
-  // counts more than the size of the photo.
+  // counts more than the size of the photo. If only the sensors of rigs are
+  // written otherwise, these are the errors in their images.
   double median_error_as_read_px = 0;
   double median_error_px = 0;
 
-  bool HasOtherPoses() const;
+  // How many things differ from COLMAP's; points are another matter.
+  int NumDifferences() const;
+
+  // A pose of an image or a frame, one of a sensor in its rig, a camera, and a
+  // 3D point in COLMAP's conventions.
+  Pose ToColmap(const Pose& pose) const;
+  Pose SensorToColmap(const Pose& sensor_from_rig) const;
+  Camera ToColmap(const Camera& camera) const;
+  Eigen::Vector3d ToColmap(const Eigen::Vector3d& xyz) const;
 };
 
 // The simplest conventions under which the model's tracks, or the matches of a
@@ -137,8 +164,9 @@ struct Conventions {
 // see them, and to a hundredth or less of the photo's size; or points alone are
 // wrong, and with others it is within 4 px. None for a model whose median error
 // is within the 4 px to which COLMAP's mapper filters, or that fits no other
-// way. Poses of rigs with several sensors are taken as they are. Requires a
-// valid model. Milliseconds for a sound model, up to a second otherwise.
+// way. In rigs, the images of reference sensors say how frames are written, and
+// then all others how sensors are. Requires a valid model. Milliseconds for a
+// sound model, up to a few seconds otherwise.
 std::optional<Conventions> FindConventions(const Model& model,
                                            const Database* database = nullptr,
                                            const Context& context = {});
@@ -185,14 +213,14 @@ struct ImageCheck {
   // wrong. For a wrong image this is the count at the time it was called wrong.
   int64_t num_tested = 0;
   int64_t num_wrong = 0;
-  // The turn and shift of this image that its observations ask for, if the
+  // The turn and shift of its frame that its observations ask for, if the
   // other images stay and points move along.
   double turn_deg = 0;
   double shift = 0;  // scene units
-  // The largest standard deviation of its centre in any direction, scene units,
-  // and that of its rotation. They follow from the observations that are not
-  // wrong; points move along, and other images stay. Infinite if these
-  // observations do not hold the image at all.
+  // The largest standard deviation of its frame's centre in any direction,
+  // scene units, and that of its rotation. They follow from the frame's
+  // observations that are not wrong; points move along, and other frames stay.
+  // Infinite if these observations do not hold the frame at all.
   double center_sigma = 0;
   double turn_sigma_deg = 0;
   // center_sigma relative to the median image's; infinite likewise.

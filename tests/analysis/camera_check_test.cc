@@ -194,9 +194,9 @@ TEST(FindWrongCameras, GainsWhatFreeingTheCameraTakesFromTheSumOfSquares) {
   const ModelNoise noise = EstimateNoise(model, options, {});
   ASSERT_EQ(noise.num_tested,
             static_cast<int64_t>(model.track_elements.size()));
-  const std::vector<ImageSums> sums = AddUpImages(model, noise);
+  const std::vector<PoseSums> sums = AddUpImages(model, noise);
   const std::vector<WrongCamera> wrong =
-      FindWrongCameras(model, noise, sums, 1, 0.05, 1);
+      FindWrongCameras(model, noise, 1, 0.05, 1);
   ASSERT_THAT(wrong, SizeIs(1));
   ASSERT_EQ(wrong[0].fault, CameraFault::kPlaceInRig);
   double square = 0;

@@ -96,6 +96,35 @@ TEST(FindConventions, FindsNoneWherePosesAreWrongInDifferentWays) {
   }
 }
 
+// The same for the sensors of rigs: the rig has the cameras' axes, as a rig has
+// those of its reference sensor.
+Model SensorsWrittenBy(const Program& program, Model model) {
+  for (RigSensor& sensor : model.rigs[0].sensors) {
+    Pose& pose = *sensor.sensor_from_rig;
+    Matrix3d rotation =
+        program.axes.transpose() * pose.Rotation() * program.axes;
+    Vector3d translation = program.axes.transpose() * pose.translation;
+    if (program.writes_centers)
+      translation = -rotation.transpose() * translation;
+    if (program.writes_camera_to_world) rotation.transposeInPlace();
+    pose = ToPose({rotation, translation});
+    if (program.writes_w_last) {
+      const auto [w, x, y, z] = pose.quaternion_wxyz;
+      pose.quaternion_wxyz = {x, y, z, w};
+    }
+  }
+  return model;
+}
+
+Model RigSceneOfColmap(double outlier_ratio = 0) {
+  SceneOptions options = SceneOf(20, 1000, 8, 0.5, 7);
+  options.sensors_per_rig = 4;
+  options.rig_rotation_deg = 17;
+  options.rig_baseline = 0.1;
+  options.outlier_ratio = outlier_ratio;
+  return SynthesizeScene(options).model;
+}
+
 // What the conversion must give back: rays and points as in COLMAP's model, up
 // to the world's axes.
 TEST(FindConventions, FindsHowAnotherProgramWritesPoses) {
@@ -105,10 +134,10 @@ TEST(FindConventions, FindsHowAnotherProgramWritesPoses) {
     const Model written = WrittenBy(program, model);
     const auto found = FindConventions(written);
     ASSERT_TRUE(found);
-    EXPECT_EQ(found->has_w_last, program.writes_w_last);
-    EXPECT_EQ(found->is_world_from_cam, program.writes_camera_to_world);
-    EXPECT_EQ(found->has_centers, program.writes_centers);
-    EXPECT_EQ(found->is_left_handed, program.axes.determinant() < 0);
+    EXPECT_EQ(found->poses.has_w_last, program.writes_w_last);
+    EXPECT_EQ(found->poses.is_world_from_cam, program.writes_camera_to_world);
+    EXPECT_EQ(found->poses.has_centers, program.writes_centers);
+    EXPECT_EQ(found->poses.is_left_handed, program.axes.determinant() < 0);
     EXPECT_EQ(found->intrinsics_factor, 1);
     EXPECT_FALSE(found->has_wrong_points);
 
@@ -148,7 +177,7 @@ TEST(FindConventions, FindsIntrinsicsOfPhotosOfAnotherSize) {
     const auto found = FindConventions(model);
     ASSERT_TRUE(found);
     EXPECT_EQ(found->intrinsics_factor, factor);
-    EXPECT_FALSE(found->HasOtherPoses());
+    EXPECT_EQ(found->poses.NumDifferences(), 0);
     const std::vector<double> after = PixelErrors(ConvertModel(model, *found));
     for (size_t e = 0; e < before.size(); ++e) {
       EXPECT_NEAR(after[e], before[e], 1e-6) << e;
@@ -164,8 +193,8 @@ TEST(FindConventions, FindsHowPosesOfPanoramasAreWritten) {
     SCOPED_TRACE(program.name);
     const auto found = FindConventions(WrittenBy(program, model));
     ASSERT_TRUE(found);
-    EXPECT_EQ(found->is_world_from_cam, program.writes_camera_to_world);
-    EXPECT_EQ(found->is_left_handed, program.axes.determinant() < 0);
+    EXPECT_EQ(found->poses.is_world_from_cam, program.writes_camera_to_world);
+    EXPECT_EQ(found->poses.is_left_handed, program.axes.determinant() < 0);
   }
 }
 
@@ -176,7 +205,7 @@ TEST(FindConventions, FindsPointsThatAreNotWhereImagesSeeThem) {
   const auto found = FindConventions(model);
   ASSERT_TRUE(found);
   EXPECT_TRUE(found->has_wrong_points);
-  EXPECT_FALSE(found->HasOtherPoses());
+  EXPECT_EQ(found->poses.NumDifferences(), 0);
   EXPECT_EQ(found->intrinsics_factor, 1);
   const Model cured = CureModel(model, CheckModel(model)).model;
   EXPECT_LE(Summarize(PixelErrors(cured)).rms, before);
@@ -185,6 +214,51 @@ TEST(FindConventions, FindsPointsThatAreNotWhereImagesSeeThem) {
 TEST(FindConventions, CallsPointsWrongOnlyOfSoundPoses) {
   Model model = SceneOfColmap(6);
   for (Camera& camera : model.cameras) camera.params[0] *= 1.2;
+  EXPECT_FALSE(FindConventions(model));
+}
+
+// Several programs write the sensors of a level rig alike, so it only counts
+// that they are read as they were.
+TEST(FindConventions, FindsHowSensorsOfRigsAreWritten) {
+  const Model model = RigSceneOfColmap(/*outlier_ratio=*/0.1);
+  EXPECT_FALSE(FindConventions(model));
+  const std::vector<double> before = PixelErrors(model);
+  for (const Program& program : Programs()) {
+    for (const bool writes_frames_so : {false, true}) {
+      SCOPED_TRACE(program.name);
+      Model written = SensorsWrittenBy(program, model);
+      if (writes_frames_so) written = WrittenBy(program, written);
+      const auto found = FindConventions(written);
+      ASSERT_TRUE(found);
+      EXPECT_EQ(found->poses.NumDifferences() > 0, writes_frames_so);
+      EXPECT_EQ(found->rig_factor, 1);
+      const std::vector<double> after =
+          PixelErrors(ConvertModel(written, *found));
+      for (size_t e = 0; e < before.size(); ++e) {
+        EXPECT_NEAR(after[e], before[e], 1e-6) << e;
+      }
+    }
+  }
+}
+
+TEST(FindConventions, FindsRigsInAnotherUnitThanTheWorld) {
+  Model model = RigSceneOfColmap();
+  const double rms = Summarize(PixelErrors(model)).rms;
+  for (RigSensor& sensor : model.rigs[0].sensors) {
+    sensor.sensor_from_rig->translation *= 40;
+  }
+  const auto found = FindConventions(model);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->NumDifferences(), 1);
+  EXPECT_NEAR(40 * found->rig_factor, 1, 0.01);
+  EXPECT_LT(Summarize(PixelErrors(ConvertModel(model, *found))).rms, 1.2 * rms);
+}
+
+// One wrong sensor is a fault of the model, not a convention.
+TEST(FindConventions, LeavesOneSensorThatIsWrittenOtherwise) {
+  Model model = RigSceneOfColmap();
+  Pose& pose = *model.rigs[0].sensors[1].sensor_from_rig;
+  pose = ToPose(Inverse(pose.Transform()));
   EXPECT_FALSE(FindConventions(model));
 }
 

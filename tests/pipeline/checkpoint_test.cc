@@ -10,7 +10,6 @@
 #include <gtest/gtest.h>
 
 #include "krot/base/checkpoint.h"
-#include "krot/pipeline/checkpoint_file.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/pipeline/solve_by_ranks.h"

@@ -5,7 +5,7 @@
 
 #include "krot/convert/certificate_file.h"
 #include "krot/model/model_io.h"
-#include "krot/pipeline/checkpoint_file.h"
+#include "krot/pipeline/solve_model.h"
 #include "krot/report/text_table.h"
 #include "krot/version.h"
 #include "tools/krot/interrupt.h"

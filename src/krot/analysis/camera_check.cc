@@ -115,16 +115,10 @@ class PoseElimination {
   }
 
  private:
-  // By the frame's turn about its centre and by that, in units of length.
+  // The centre in units of length.
   Matrix26 ByFrame(const PoseRow& row) const {
-    const ImageGeometry& geometry = rows_.geometries()[row.image];
-    const Vector3d center = Center(geometry.cam_from_rig);
-    const Matrix3d world_from_rig =
-        geometry.rig_from_world.rotation.transpose();
-    Matrix26 F;
-    F << row.F.leftCols<3>() * geometry.cam_from_rig.rotation +
-             row.F.rightCols<3>() * world_from_rig * CrossMatrix(center),
-        row.F.rightCols<3>() * length_;
+    Matrix26 F = rows_.ByFrame(row);
+    F.rightCols<3>() *= length_;
     return F;
   }
 
@@ -212,12 +206,11 @@ class PoseElimination {
 class CameraChecker {
  public:
   CameraChecker(const Model& model, const ModelNoise& noise,
-                const std::vector<ImageSums>& sums, int least_num_images,
-                double false_alarm, int num_threads)
+                int least_num_images, double false_alarm, int num_threads)
       : model_(model),
         noise_(noise),
         rows_(model, noise),
-        shared_(model, rows_.geometries(), sums),
+        shared_(model, rows_.geometries(), AddUpImages(model, noise)),
         least_num_images_(least_num_images),
         num_threads_(num_threads) {
     least_exponent_ =
@@ -352,11 +345,9 @@ class CameraChecker {
 
 std::vector<WrongCamera> FindWrongCameras(const Model& model,
                                           const ModelNoise& noise,
-                                          const std::vector<ImageSums>& sums,
                                           int least_num_images,
                                           double false_alarm, int num_threads) {
-  return CameraChecker(model, noise, sums, least_num_images, false_alarm,
-                       num_threads)
+  return CameraChecker(model, noise, least_num_images, false_alarm, num_threads)
       .Run();
 }
 

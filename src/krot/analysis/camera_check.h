@@ -34,6 +34,9 @@ class PoseRows {
 
   const std::vector<ImageGeometry>& geometries() const { return geometries_; }
 
+  // By the turn of the row's frame about its centre, in rig axes, and by that.
+  Eigen::Matrix<double, 2, 6> ByFrame(const PoseRow& row) const;
+
   // G with G G' = H^+, H being the information of the rows about their point.
   static Eigen::Matrix3d RootOf(const std::vector<PoseRow>& rows);
 
@@ -55,7 +58,7 @@ struct SharedGroup {
   Eigen::Index begin = 0;   // the first column
   Eigen::Index size = 0;
   int64_t num_images = 0;
-  // As in ImageSums, over the camera's images.
+  // As in PoseSums, over the camera's images.
   int64_t num_directions = 0;
   double square = 0;
 };
@@ -75,7 +78,7 @@ class SharedColumns {
   // Keeps references. `sums` are AddUpImages of the model.
   SharedColumns(const Model& model,
                 const std::vector<ImageGeometry>& geometries,
-                const std::vector<ImageSums>& sums);
+                const std::vector<PoseSums>& sums);
 
   const std::vector<SharedGroup>& groups() const { return groups_; }
   Eigen::Index num_columns() const { return num_columns_; }
@@ -114,13 +117,11 @@ class SharedColumns {
 // Cameras of fewer images than `least_num_images` are not called wrong. What
 // lowers it most goes first, and then the gain of all others beside it is
 // found. Takes the observations that `noise` tests; noise.sigma_px must be
-// known; `sums` are AddUpImages of both. Where nothing gains as much with the
-// poses held, as in a model that was adjusted with all cameras free, the cost
-// is O(observations), otherwise that of a step of bundle adjustment. The same
-// bits at any number of threads.
+// known. Where nothing gains as much with the poses held, as in a model that
+// was adjusted with all cameras free, the cost is O(observations), otherwise
+// that of a step of bundle adjustment. The same bits at any number of threads.
 std::vector<WrongCamera> FindWrongCameras(const Model& model,
                                           const ModelNoise& noise,
-                                          const std::vector<ImageSums>& sums,
                                           int least_num_images,
                                           double false_alarm, int num_threads);
 

@@ -1,11 +1,13 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 #include <utility>
 #include <vector>
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 
 #include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
@@ -19,7 +21,6 @@
 namespace krot::internal {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // The right reading lowers the median error of a wrong model by more than this
@@ -27,218 +28,208 @@ using Eigen::Vector3d;
 // this share of the photo's size. Poses from a phone's sensors are as good.
 constexpr double kClearly = 4;
 constexpr double kFits = 0.01;
-constexpr int64_t kNumTracks = 200;  // that are asked, evenly spread
-
-// The rotations that take axes to axes.
-std::vector<Matrix3d> AxisRotations() {
-  std::vector<Matrix3d> rotations;
-  for (const int i : {0, 1, 2}) {
-    for (const int j : {(i + 1) % 3, (i + 2) % 3}) {
-      for (const int signs : {0, 1, 2, 3}) {
-        const Vector3d x = ((signs & 1) != 0 ? -1 : 1) * Vector3d::Unit(i);
-        const Vector3d y = ((signs & 2) != 0 ? -1 : 1) * Vector3d::Unit(j);
-        rotations.emplace_back() << x, y, x.cross(y);
-      }
-    }
-  }
-  return rotations;
-}
-
-// How many things differ from COLMAP's; points are another matter.
-int NumDifferences(const Conventions& one) {
-  return one.has_w_last + (one.is_world_from_cam || one.has_centers) +
-         (one.is_left_handed || !one.cam_from_file_axes.isIdentity()) +
-         (one.intrinsics_factor != 1) + one.has_central_principal_point;
-}
-
-// COLMAP's own first.
-std::vector<Conventions> AllIntrinsics() {
-  std::vector<Conventions> all;
-  for (const double factor : {1.0, 0.5, 2.0, 0.25, 4.0, 0.125, 8.0}) {
-    for (const bool is_central : {false, true}) {
-      Conventions& one = all.emplace_back();
-      one.intrinsics_factor = factor;
-      one.has_central_principal_point = is_central;
-    }
-  }
-  return all;
-}
-
-// All readings of the poses with these intrinsics.
-std::vector<Conventions> AllPoses(const Conventions& intrinsics) {
-  std::vector<Conventions> all;
-  for (int bits = 0; bits < 16; ++bits) {
-    for (const Matrix3d& cam_from_file_axes : AxisRotations()) {
-      Conventions& one = all.emplace_back(intrinsics);
-      one.has_w_last = (bits & 1) != 0;
-      one.is_world_from_cam = (bits & 2) != 0;
-      one.has_centers = (bits & 4) != 0;
-      one.is_left_handed = (bits & 8) != 0;
-      one.cam_from_file_axes = cam_from_file_axes;
-    }
-  }
-  return all;
-}
-
-const Matrix3d kMirror = Vector3d(1, -1, 1).asDiagonal();
-
-RigidTransform ConvertPose(const Pose& pose, const Conventions& from) {
-  QuaternionWxyz wxyz = pose.quaternion_wxyz;
-  if (from.has_w_last) wxyz = {wxyz[3], wxyz[0], wxyz[1], wxyz[2]};
-  Matrix3d rotation = RotationOf(wxyz);
-  if (from.is_world_from_cam) rotation.transposeInPlace();
-  Vector3d translation = pose.translation;
-  if (from.has_centers) translation = -rotation * translation;
-  if (from.is_left_handed) {
-    rotation = kMirror * rotation * kMirror;
-    translation = kMirror * translation;
-  }
-  return {from.cam_from_file_axes * rotation,
-          from.cam_from_file_axes * translation};
-}
-
-Camera ConvertCamera(const Camera& camera, const Conventions& from) {
-  Camera converted = camera;
-  const CameraModelInfo& info = *FindCameraModel(camera.model_id);
-  if (!info.has_image_plane) return camera;
-  const double factor = from.intrinsics_factor;
-  converted.width = std::llround(factor * static_cast<double>(camera.width));
-  converted.height = std::llround(factor * static_cast<double>(camera.height));
-  const size_t center = info.param_names.substr(0, 2) == "fx" ? 2 : 1;
-  for (size_t i = 0; i < center + 2; ++i) converted.params[i] *= factor;
-  if (from.has_central_principal_point) {
-    converted.params[center] = static_cast<double>(converted.width) / 2;
-    converted.params[center + 1] = static_cast<double>(converted.height) / 2;
-  }
-  return converted;
-}
-
-void AddBearing(const RigidTransform& cam_from_world, const Vector3d& bearing,
-                NearestPoint* nearest) {
-  nearest->Add(Center(cam_from_world),
-               cam_from_world.rotation.transpose() * bearing, 1);
-}
-
-Eigen::Vector2d PixelOf(const Model& model, int32_t image, uint64_t e) {
-  const uint32_t i = model.track_elements[e].point2D_idx;
-  const Point2D& pixel = model.images[image].points2D[i];
-  return {pixel.x, pixel.y};
-}
+constexpr size_t kNumTracks = 200;  // that are asked, evenly spread
+// So many tracks, or so many observations of a sensor, tell something.
+constexpr size_t kFewest = 10;
 
 struct Sight {
   int32_t image = -1;
   Eigen::Vector2d pixel;
+  bool is_anchor = true;  // takes part in where its track's point is
+  bool is_asked = true;   // its error counts
 };
 
-// Reads a sample of a model's tracks, or of a database's matches, as different
-// programs would have written the model.
-class ConventionSearch {
+// What is asked of images of reference sensors (which are all, but for rigs
+// with several sensors) and of others; none: to be left out.
+struct Roles {
+  struct Role {
+    bool is_anchor = false, is_asked = false;
+  };
+  std::optional<Role> of_references, of_others;
+};
+constexpr Roles kReferencesAlone = {{{true, true}}, {}};
+constexpr Roles kOthersAtReferences = {{{true, false}}, {{false, true}}};
+constexpr Roles kOthers = {{{true, false}}, {{true, true}}};
+
+// A sample of a model's tracks, or of a database's matches, seen by cameras in
+// other conventions than the model's.
+class TrackSample {
  public:
-  ConventionSearch(const Model& model, const Database* database)
-      : model_(model), geometries_(ImageGeometries(model)) {
-    std::vector<int> num_images(model.frames.size(), 0);
-    for (const ImageGeometry& geometry : geometries_) {
-      if (!geometry.has_pose) continue;
-      has_own_poses_ = has_own_poses_ && geometry.sensor < 0 &&
-                       ++num_images[geometry.frame] == 1;
-    }
+  // Takes matches if there are no tracks. Keeps references.
+  TrackSample(const Model& model, const std::vector<ImageGeometry>& geometries,
+              const Roles& roles, const Database* database)
+      : model_(model), geometries_(geometries), roles_(roles) {
     TakeTracks();
     if (tracks_.empty() && database != nullptr) TakeMatches(*database);
   }
 
-  std::optional<Conventions> Run(const Context& context) const {
-    const bool is_in_one_place = std::all_of(
-        geometries_.begin(), geometries_.end(), [](const ImageGeometry& one) {
-          return !one.has_pose || one.cam_from_world.translation.isZero();
-        });
-    if (is_in_one_place) return std::nullopt;
-    // With points where their images see them, and as they stand.
-    const double seen = MedianErrorWhereSeen({}, LensesIn({}));
-    const double as_read =
-        places_.empty() ? seen
-                        : MedianError(model_.cameras, Poses({}),
-                                      [&](size_t k) { return places_[k]; });
-    if (as_read <= kFilteredPx) return std::nullopt;
-    for (const Conventions& intrinsics : AllIntrinsics()) {
-      Conventions best = SimplestOfBest(MeasureAll(intrinsics, context));
-      // If points alone are wrong, the poses are as good as COLMAP's.
-      const double limit = NumDifferences(best) == 0
-                               ? kFilteredPx
-                               : std::min(kFits * largest_px_, seen / kClearly);
-      if (best.median_error_px <= std::min(limit, as_read / kClearly)) {
-        best.median_error_as_read_px = as_read;
-        best.has_wrong_points = HasWrongPoints(best);
-        return best;
-      }
-      if (seen <= kFits * largest_px_) break;  // wrong intrinsics do worse
+  size_t num_tracks() const { return tracks_.size(); }
+  // The error below which a reading fits.
+  double FitPx() const { return kFits * largest_px_; }
+
+  double MedianErrorWhereSeen(const Conventions& from) const {
+    return MedianErrorWhereSeen(from, LensesIn(from));
+  }
+
+  // With the model's points; where there are none, where they are seen.
+  double MedianErrorWithPoints(const Conventions& from) const {
+    if (places_.empty()) return MedianErrorWhereSeen(from);
+    return MedianError(Cameras(from), Poses(from), [&](size_t k) {
+      return std::optional(from.ToColmap(places_[k]));
+    });
+  }
+
+  // Points may be right where poses are read wrongly.
+  bool HasWrongPoints(const Conventions& from) const {
+    return MedianErrorWithPoints(from) >
+           std::max(kFilteredPx, kClearly * from.median_error_px);
+  }
+
+  // The simplest of those with the least errors; they have the same lenses.
+  Conventions SimplestOfBest(std::vector<Conventions> all,
+                             const Context& context) const {
+    const Lenses lenses = LensesIn(all.front());
+    ParallelForEach(
+        static_cast<int64_t>(all.size()), context.num_threads,
+        [&](int64_t n) {
+          all[n].median_error_px = MedianErrorWhereSeen(all[n], lenses);
+        },
+        /*chunk_size=*/16);
+    std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
+      return a.median_error_px < b.median_error_px;
+    });
+    const Conventions* simplest = &all.front();
+    for (const Conventions& one : all) {
+      if (one.median_error_px > 2 * all.front().median_error_px) break;
+      if (one.NumDifferences() < simplest->NumDifferences()) simplest = &one;
     }
-    return std::nullopt;
+    return *simplest;
+  }
+
+  // Adds to `all`, which have the same lenses, each with other translations of
+  // its sensors: so much longer that, in the median, rays of other sensors pass
+  // their points where references see them.
+  void AddWithRigFactors(std::vector<Conventions>* all) const {
+    const Lenses lenses = LensesIn(all->front());
+    for (size_t n = all->size(); n-- > 0;) {
+      Conventions one = (*all)[n];
+      one.rig_factor = RigFactor(one, lenses);
+      if (one.rig_factor != 1) all->push_back(one);
+    }
   }
 
  private:
-  // Points may be right where poses are read wrongly.
-  bool HasWrongPoints(const Conventions& from) const {
-    if (places_.empty()) return false;
-    const double error = MedianError(Cameras(from), Poses(from), [&](size_t k) {
-      return std::optional(from.is_left_handed ? Vector3d(kMirror * *places_[k])
-                                               : *places_[k]);
-    });
-    return error > std::max(kFilteredPx, kClearly * from.median_error_px);
-  }
+  struct Lenses {
+    std::vector<Camera> cameras;
+    // Of all tracks' pixels, in camera axes; none where the lens has none.
+    std::vector<std::vector<std::optional<Vector3d>>> bearings;
+  };
 
-  std::optional<Sight> SightOf(int32_t image, const Eigen::Vector2d& pixel) {
-    if (!geometries_[image].has_pose) return std::nullopt;
-    largest_px_ = std::fmax(largest_px_, pixel.cwiseAbs().maxCoeff());
-    images_.insert(image);
-    return Sight{image, pixel};
+  // 1 if nothing tells it.
+  double RigFactor(const Conventions& from, const Lenses& lenses) const {
+    const std::vector<RigidTransform> poses = Poses(from);
+    std::vector<double> factors;
+    for (size_t k = 0; k < tracks_.size(); ++k) {
+      const std::optional<Vector3d> place = PlaceOf(k, poses, lenses);
+      if (!place) continue;
+      for (size_t i = 0; i < tracks_[k].size(); ++i) {
+        const Sight& sight = tracks_[k][i];
+        const std::optional<Vector3d>& bearing = lenses.bearings[k][i];
+        if (sight.is_anchor || !bearing) continue;
+        // b x (R x + f t) = 0
+        const Vector3d t = SensorOf(sight.image, from).translation;
+        const Vector3d b_t = bearing->cross(t);
+        const Vector3d b_R_x = bearing->cross(poses[sight.image] * *place - t);
+        const double factor = -b_t.dot(b_R_x) / b_t.squaredNorm();
+        if (factor > 0 && std::isfinite(factor)) factors.push_back(factor);
+      }
+    }
+    return factors.empty() ? 1 : LowerMedian(std::move(factors));
   }
 
   void TakeTracks() {
     const std::vector<int32_t> image_of = ImagesOfElements(model_);
-    const auto num = static_cast<int64_t>(model_.points3D.size());
-    const int64_t num_taken = std::min(num, kNumTracks);
-    for (int64_t i = 0; i < num_taken; ++i) {
-      const Point3D& point = model_.points3D[i * num / num_taken];
-      std::vector<Sight> track;
-      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-        const int32_t n = image_of[e];
-        const auto sight = SightOf(n, PixelOf(model_, n, e));
-        if (sight) track.push_back(*sight);
+    const size_t num = model_.points3D.size();
+    const size_t stride = num / kNumTracks + 1;
+    for (size_t first = 0; first < std::min(stride, num); ++first) {
+      for (size_t k = first; k < num; k += stride) {
+        if (tracks_.size() == kNumTracks) return;
+        const Point3D& point = model_.points3D[k];
+        std::vector<Sight> track;
+        for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+          const uint32_t i = model_.track_elements[e].point2D_idx;
+          const Point2D& pixel = model_.images[image_of[e]].points2D[i];
+          AddSight(image_of[e], {pixel.x, pixel.y}, &track);
+        }
+        if (TakeIfTells(std::move(track))) places_.push_back(point.xyz);
       }
-      if (track.size() < 2) continue;
-      tracks_.push_back(std::move(track));
-      places_.emplace_back(point.xyz);
     }
   }
 
   void TakeMatches(const Database& database) {
-    int64_t num = 0;
+    int64_t num = 0, passed = 0;
     for (const VerifiedPair& pair : database.pairs) {
       num += static_cast<int64_t>(pair.matches.size());
     }
-    const int64_t step = num / kNumTracks + 1;
-    int64_t passed = 0;
+    const int64_t step = num / static_cast<int64_t>(kNumTracks) + 1;
     for (const VerifiedPair& pair : database.pairs) {
       for (const auto& match : pair.matches) {
         if (passed++ % step != 0) continue;
-        const auto first =
-            SightOf(pair.image1, database.keypoints[pair.image1][match[0]]);
-        const auto second =
-            SightOf(pair.image2, database.keypoints[pair.image2][match[1]]);
-        if (first && second) tracks_.push_back({*first, *second});
+        std::vector<Sight> track;
+        const auto& [i1, i2] = match;
+        AddSight(pair.image1, database.keypoints[pair.image1][i1], &track);
+        AddSight(pair.image2, database.keypoints[pair.image2][i2], &track);
+        TakeIfTells(std::move(track));
       }
     }
+  }
+
+  const std::optional<Roles::Role>& RoleOf(int32_t image) const {
+    static const std::optional<Roles::Role> kNone;
+    const ImageGeometry& geometry = geometries_[image];
+    if (!geometry.has_pose) return kNone;
+    return geometry.sensor < 0 ? roles_.of_references : roles_.of_others;
+  }
+
+  bool TakeIfTells(std::vector<Sight> track) {
+    const auto is_anchor = [](const Sight& sight) { return sight.is_anchor; };
+    const auto is_asked = [](const Sight& sight) { return sight.is_asked; };
+    if (std::count_if(track.begin(), track.end(), is_anchor) < 2 ||
+        std::none_of(track.begin(), track.end(), is_asked)) {
+      return false;
+    }
+    for (const Sight& sight : track) {
+      largest_px_ = std::fmax(largest_px_, sight.pixel.cwiseAbs().maxCoeff());
+      images_.insert(sight.image);
+    }
+    tracks_.push_back(std::move(track));
+    return true;
+  }
+
+  void AddSight(int32_t image, const Eigen::Vector2d& pixel,
+                std::vector<Sight>* track) const {
+    const auto& role = RoleOf(image);
+    if (role) {
+      track->push_back({image, pixel, role->is_anchor, role->is_asked});
+    }
+  }
+
+  // Of a sensor that is not its rig's reference.
+  RigidTransform SensorOf(int32_t image, const Conventions& from) const {
+    const ImageGeometry& geometry = geometries_[image];
+    const RigSensor& sensor =
+        model_.rigs[geometry.rig].sensors[geometry.sensor];
+    return from.SensorToColmap(*sensor.sensor_from_rig).Transform();
   }
 
   // Of the images that see tracks; all others are left at the identity.
   std::vector<RigidTransform> Poses(const Conventions& from) const {
     std::vector<RigidTransform> poses(geometries_.size());
     for (const int32_t n : images_) {
-      poses[n] =
-          has_own_poses_
-              ? ConvertPose(model_.frames[geometries_[n].frame].rig_from_world,
-                            from)
-              : geometries_[n].cam_from_world;
+      const ImageGeometry& geometry = geometries_[n];
+      poses[n] = from.ToColmap(model_.frames[geometry.frame].rig_from_world)
+                     .Transform();
+      if (geometry.sensor >= 0) poses[n] = SensorOf(n, from) * poses[n];
     }
     return poses;
   }
@@ -246,106 +237,137 @@ class ConventionSearch {
   std::vector<Camera> Cameras(const Conventions& from) const {
     std::vector<Camera> cameras;
     for (const Camera& camera : model_.cameras) {
-      cameras.push_back(ConvertCamera(camera, from));
+      cameras.push_back(from.ToColmap(camera));
     }
     return cameras;
   }
 
-  std::vector<Conventions> MeasureAll(const Conventions& intrinsics,
-                                      const Context& context) const {
-    const Lenses lenses = LensesIn(intrinsics);
-    std::vector<Conventions> all =
-        has_own_poses_ ? AllPoses(intrinsics) : std::vector{intrinsics};
-    ParallelForEach(
-        static_cast<int64_t>(all.size()), context.num_threads,
-        [&](int64_t n) {
-          all[n].median_error_px = MedianErrorWhereSeen(all[n], lenses);
-        },
-        /*chunk_size=*/16);
-    return all;
-  }
-
-  static Conventions SimplestOfBest(const std::vector<Conventions>& all) {
-    double lowest = kInfinity;
-    for (const Conventions& one : all)
-      lowest = std::min(lowest, one.median_error_px);
-    const Conventions* simplest = nullptr;
-    for (const Conventions& one : all) {
-      if (one.median_error_px > 2 * lowest) continue;
-      if (simplest == nullptr ||
-          NumDifferences(one) < NumDifferences(*simplest)) {
-        simplest = &one;
-      }
-    }
-    return *simplest;
-  }
-
-  struct Lenses {
-    std::vector<Camera> cameras;
-    // Of all tracks' pixels, in camera axes; none where the lens has none.
-    std::vector<std::vector<std::optional<Vector3d>>> bearings;
-  };
   Lenses LensesIn(const Conventions& from) const {
     Lenses lenses = {Cameras(from), {}};
     for (const std::vector<Sight>& track : tracks_) {
       auto& bearings = lenses.bearings.emplace_back();
       for (const Sight& sight : track) {
-        bearings.push_back(
-            PixelBearing(CameraOf(sight, lenses.cameras), sight.pixel));
+        bearings.push_back(PixelBearing(
+            lenses.cameras[geometries_[sight.image].camera], sight.pixel));
       }
     }
     return lenses;
   }
 
+  std::optional<Vector3d> PlaceOf(size_t k,
+                                  const std::vector<RigidTransform>& poses,
+                                  const Lenses& lenses) const {
+    NearestPoint nearest;
+    for (size_t i = 0; i < tracks_[k].size(); ++i) {
+      const Sight& sight = tracks_[k][i];
+      if (!sight.is_anchor) continue;
+      const std::optional<Vector3d>& bearing = lenses.bearings[k][i];
+      if (!bearing) return std::nullopt;
+      const RigidTransform& pose = poses[sight.image];
+      nearest.Add(Center(pose), pose.rotation.transpose() * *bearing, 1);
+    }
+    return nearest.Solve();
+  }
+
   double MedianErrorWhereSeen(const Conventions& from,
                               const Lenses& lenses) const {
     const std::vector<RigidTransform> poses = Poses(from);
-    return MedianError(lenses.cameras, poses, [&](size_t k) {
-      NearestPoint nearest;
-      for (size_t i = 0; i < tracks_[k].size(); ++i) {
-        const std::optional<Vector3d>& bearing = lenses.bearings[k][i];
-        if (!bearing) return std::optional<Vector3d>();
-        AddBearing(poses[tracks_[k][i].image], *bearing, &nearest);
-      }
-      return nearest.Solve();
-    });
+    return MedianError(lenses.cameras, poses,
+                       [&](size_t k) { return PlaceOf(k, poses, lenses); });
   }
 
-  const Camera& CameraOf(const Sight& sight,
-                         const std::vector<Camera>& cameras) const {
-    return cameras[geometries_[sight.image].camera];
-  }
-
-  // No error counts more than the largest coordinate of a pixel, and that of a
-  // point that is not in front of its camera as much.
-  template <typename PlaceOf>
+  // The median error of the sensor that has the largest; reference sensors are
+  // taken together. No error counts more than the largest coordinate of a
+  // pixel, and that of a point that is not in front of its camera as much.
+  template <typename PlaceOfTrack>
   double MedianError(const std::vector<Camera>& cameras,
                      const std::vector<RigidTransform>& poses,
-                     const PlaceOf& place_of) const {
-    std::vector<double> errors;
+                     const PlaceOfTrack& place_of) const {
+    std::map<std::array<int32_t, 2>, std::vector<double>> errors;
     for (size_t k = 0; k < tracks_.size(); ++k) {
       const std::optional<Vector3d> place = place_of(k);
       for (const Sight& sight : tracks_[k]) {
-        const auto pixel = place ? ProjectPoint(CameraOf(sight, cameras),
+        if (!sight.is_asked) continue;
+        const ImageGeometry& geometry = geometries_[sight.image];
+        const auto pixel = place ? ProjectPoint(cameras[geometry.camera],
                                                 poses[sight.image] * *place)
                                  : std::nullopt;
         const double error = pixel ? (*pixel - sight.pixel).norm() : kInfinity;
-        errors.push_back(std::fmin(error, largest_px_));
+        const bool is_reference = geometry.sensor < 0;
+        errors[{is_reference ? -1 : geometry.rig, geometry.sensor}].push_back(
+            std::fmin(error, largest_px_));
       }
     }
-    return errors.empty() ? 0 : LowerMedian(std::move(errors));
+    double largest = 0;
+    for (auto& [sensor, of_sensor] : errors) {
+      if (of_sensor.size() < kFewest && errors.size() > 1) continue;
+      largest = std::max(largest, LowerMedian(std::move(of_sensor)));
+    }
+    return largest;
   }
 
   const Model& model_;
-  const std::vector<ImageGeometry> geometries_;
-  // Whether each frame is one image, so that its pose can be read otherwise.
-  bool has_own_poses_ = true;
+  const std::vector<ImageGeometry>& geometries_;
+  const Roles roles_;
   std::vector<std::vector<Sight>> tracks_;
-  std::set<int32_t> images_;  // that see them
-  double largest_px_ = 0;     // coordinate of a pixel
-  // Of the points, in the model as it stands; empty for matches.
-  std::vector<std::optional<Vector3d>> places_;
+  std::set<int32_t> images_;      // that see them
+  double largest_px_ = 0;         // coordinate of a pixel
+  std::vector<Vector3d> places_;  // the model's points; empty for matches
 };
+
+// How the images of reference sensors are written. None if they fit in no way,
+// and the default if they fit as they are.
+std::optional<Conventions> FindPoses(const TrackSample& sample,
+                                     const Context& context) {
+  const double as_read = sample.MedianErrorWithPoints({});
+  if (as_read <= kFilteredPx) return Conventions();
+  const double seen = sample.MedianErrorWhereSeen({});
+  // COLMAP's own first.
+  for (const double factor : {1.0, 0.5, 2.0, 0.25, 4.0, 0.125, 8.0}) {
+    for (const bool is_central : {false, true}) {
+      std::vector<Conventions> all;
+      for (const PoseConventions& poses : PoseConventions::All()) {
+        Conventions& one = all.emplace_back();
+        one.poses = poses;
+        one.intrinsics_factor = factor;
+        one.has_central_principal_point = is_central;
+      }
+      Conventions best = sample.SimplestOfBest(std::move(all), context);
+      // If points alone are wrong, the poses are as good as COLMAP's.
+      const double limit = best.NumDifferences() == 0
+                               ? kFilteredPx
+                               : std::min(sample.FitPx(), seen / kClearly);
+      if (best.median_error_px <= std::min(limit, as_read / kClearly)) {
+        best.median_error_as_read_px = as_read;
+        best.has_wrong_points = sample.HasWrongPoints(best);
+        return best;
+      }
+      if (seen <= sample.FitPx()) return std::nullopt;  // others do worse
+    }
+  }
+  return std::nullopt;
+}
+
+// How sensors of rigs are written, all else being `known`, which is returned if
+// they fit as they are, or in no way.
+Conventions FindSensors(const TrackSample& sample, const Conventions& known,
+                        const Context& context) {
+  const double seen = sample.MedianErrorWhereSeen(known);
+  if (seen <= kFilteredPx) return known;
+  std::vector<Conventions> all;
+  for (const PoseConventions& sensors : PoseConventions::All()) {
+    all.emplace_back(known).sensors = sensors;
+  }
+  sample.AddWithRigFactors(&all);
+  Conventions best = sample.SimplestOfBest(std::move(all), context);
+  if (best.median_error_px > std::min(sample.FitPx(), seen / kClearly)) {
+    return known;
+  }
+  best.median_error_as_read_px =
+      std::max(known.median_error_as_read_px, sample.MedianErrorWithPoints({}));
+  best.has_wrong_points = known.has_wrong_points || sample.HasWrongPoints(best);
+  return best;
+}
 
 }  // namespace
 }  // namespace krot::internal
@@ -354,47 +376,25 @@ namespace krot {
 
 using namespace internal;
 
-bool Conventions::HasOtherPoses() const {
-  return has_w_last || is_world_from_cam || has_centers || is_left_handed ||
-         !cam_from_file_axes.isIdentity();
-}
-
 std::optional<Conventions> FindConventions(const Model& model,
                                            const Database* database,
                                            const Context& context) {
-  return ConventionSearch(model, database).Run(context);
-}
-
-Model ConvertModel(const Model& model, const Conventions& from,
-                   const Context& context) {
-  Model converted = model;
-  for (Camera& camera : converted.cameras) camera = ConvertCamera(camera, from);
-  if (from.HasOtherPoses()) {
-    const std::vector<ImageGeometry> geometries = ImageGeometries(model);
-    for (size_t n = 0; n < geometries.size(); ++n) {
-      if (!geometries[n].has_pose) continue;
-      Pose& pose = converted.frames[geometries[n].frame].rig_from_world;
-      pose = ToPose(ConvertPose(pose, from));
-      converted.images[n].cam_from_world = pose;
-    }
-  }
-  const std::vector<ImageGeometry> geometries = ImageGeometries(converted);
-  const std::vector<int32_t> image_of = ImagesOfElements(converted);
-  for (Point3D& point : converted.points3D) {
-    if (from.is_left_handed) point.xyz = kMirror * point.xyz;
-    if (!from.has_wrong_points) continue;
-    NearestPoint nearest;
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      const ImageGeometry& geometry = geometries[image_of[e]];
-      if (!geometry.has_pose) continue;
-      const auto bearing = PixelBearing(converted.cameras[geometry.camera],
-                                        PixelOf(converted, image_of[e], e));
-      if (bearing) AddBearing(geometry.cam_from_world, *bearing, &nearest);
-    }
-    point.xyz = nearest.Solve().value_or(point.xyz);
-  }
-  UpdatePointErrors(PixelErrors(converted, context.num_threads), &converted);
-  return converted;
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  const bool is_in_one_place = std::all_of(
+      geometries.begin(), geometries.end(), [](const ImageGeometry& one) {
+        return !one.has_pose || one.cam_from_world.translation.isZero();
+      });
+  if (is_in_one_place) return std::nullopt;
+  auto found =
+      FindPoses({model, geometries, kReferencesAlone, database}, context);
+  if (!found) return std::nullopt;
+  const TrackSample placed(model, geometries, kOthersAtReferences, nullptr);
+  found =
+      placed.num_tracks() < kFewest
+          ? FindSensors({model, geometries, kOthers, database}, *found, context)
+          : FindSensors(placed, *found, context);
+  const bool differs = found->NumDifferences() > 0 || found->has_wrong_points;
+  return differs ? found : std::nullopt;
 }
 
 }  // namespace krot

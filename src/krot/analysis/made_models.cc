@@ -158,15 +158,6 @@ void Renumber(const IdOffsets& offsets, Model* model) {
   }
 }
 
-// Gives every image the pose that its frame and rig say.
-void FollowFrames(Model* model) {
-  const std::vector<ImageGeometry> geometries = ImageGeometries(*model);
-  for (size_t n = 0; n < model->images.size(); ++n) {
-    if (!geometries[n].rig_from_world.rotation.allFinite()) continue;
-    model->images[n].cam_from_world = ToPose(geometries[n].cam_from_world);
-  }
-}
-
 void Mark(const std::string& prefix, const std::array<uint8_t, 3>& color,
           Model* model) {
   for (Image& image : model->images) image.name = prefix + image.name;

@@ -50,7 +50,7 @@ class Checker {
       snooping_ = SnoopNoise(model_, noise_options_, context_, !judges_cameras);
       if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
       Count();
-      sums_ = AddUpImages(model_, snooping_.noise);
+      sums_ = AddUpFrames(model_, snooping_.noise);
       check_.is_adjusted = IsAdjusted();
       if (judges_cameras) {
         JudgeCameras();
@@ -141,9 +141,9 @@ class Checker {
 
   // A camera of one image is judged as an image is, in an adjusted model.
   void JudgeCameras() {
-    check_.cameras = FindWrongCameras(
-        model_, snooping_.noise, sums_, check_.is_adjusted ? 1 : 2,
-        options_.false_alarm, context_.num_threads);
+    check_.cameras =
+        FindWrongCameras(model_, snooping_.noise, check_.is_adjusted ? 1 : 2,
+                         options_.false_alarm, context_.num_threads);
     check_.is_adjusted = check_.is_adjusted && check_.cameras.empty();
   }
 
@@ -376,7 +376,7 @@ class Checker {
   const std::vector<ErrorsInDisc> in_disc_;
   NoiseOptions noise_options_;
   NoiseSnooping snooping_;
-  std::vector<ImageSums> sums_;  // as Model::images
+  std::vector<PoseSums> sums_;  // as Model::images, of their frames
   double median_kept_ = 0;
   ModelCheck check_;
 };

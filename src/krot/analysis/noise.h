@@ -151,11 +151,12 @@ class TrackNoise {
   std::vector<char> is_in_camera_;       // the fit of each point
 };
 
-// Sums over an image's observations, in the directions that other images
-// control. The points move along and are eliminated: M is its diagonal block of
-// the reduced camera system, sigma^2 M^-1 its covariance while the other images
-// stay, and -M^-1 g the step that its errors ask for.
-struct ImageSums {
+// Sums over the observations of a pose, which is an image's or a frame's, in
+// the directions that other poses control. The points move along and are
+// eliminated: M is its diagonal block of the reduced camera system, sigma^2
+// M^-1 its covariance while the other poses stay, and -M^-1 g the step that its
+// errors ask for.
+struct PoseSums {
   Eigen::Matrix<double, 6, 6> M =
       Eigen::Matrix<double, 6, 6>::Zero();  // F' R_ii F, R_ii as above
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();  // F' e
@@ -186,7 +187,7 @@ struct ImageSums {
   }
 };
 
-// The general form of ImageSums::GainExponent: by freeing so many parameters
+// The general form of PoseSums::GainExponent: by freeing so many parameters
 // the sum of squares `square`, over so many directions, falls by `gain`. An odd
 // number of parameters is rounded up.
 double GainExponent(double gain, double square, int64_t num_directions,
@@ -234,8 +235,11 @@ std::vector<ErrorsInDisc> FillDiscs(const Model& model,
 double SuccessExponent(int64_t num_successes, int64_t num_trials, double p);
 
 // The sums of each image, over the observations that are tested according to
-// `noise`. Requires a valid model. O(observations).
-std::vector<ImageSums> AddUpImages(const Model& model, const ModelNoise& noise);
+// `noise`; and for each image those of its frame, whose images, if there are
+// others in its rig, have one pose and control each other as one. Requires a
+// valid model. O(observations), times the square of the images of a frame.
+std::vector<PoseSums> AddUpImages(const Model& model, const ModelNoise& noise);
+std::vector<PoseSums> AddUpFrames(const Model& model, const ModelNoise& noise);
 
 // CheckModel of a model in COLMAP's conventions.
 ModelCheck CheckConverted(const Model& model, const ModelCheckOptions& options,

@@ -18,11 +18,11 @@ namespace krot::internal {
 namespace {
 
 using Eigen::Index;
-using Eigen::Matrix2d;
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
+using Matrix26 = Eigen::Matrix<double, 2, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 // Of a difference quotient, relative to parameters above 1: its square and the
@@ -107,9 +107,20 @@ Matrix3d PoseRows::RootOf(const std::vector<PoseRow>& rows) {
   return RootOfInverse(H);
 }
 
+Matrix26 PoseRows::ByFrame(const PoseRow& row) const {
+  const ImageGeometry& geometry = geometries_[row.image];
+  const Matrix3d world_from_rig = geometry.rig_from_world.rotation.transpose();
+  Matrix26 F;
+  F << row.F.leftCols<3>() * geometry.cam_from_rig.rotation +
+           row.F.rightCols<3>() * world_from_rig *
+               CrossMatrix(Center(geometry.cam_from_rig)),
+      row.F.rightCols<3>();
+  return F;
+}
+
 SharedColumns::SharedColumns(const Model& model,
                              const std::vector<ImageGeometry>& geometries,
-                             const std::vector<ImageSums>& sums)
+                             const std::vector<PoseSums>& sums)
     : model_(model), geometries_(geometries) {
   AddLenses();
   AddPlaces();
@@ -218,20 +229,38 @@ std::vector<ByGroup> SharedColumns::ByGroups(const PoseRow& row) const {
 
 namespace {
 
-void Add(const PoseRow& row, const Matrix2d& R, ImageSums* sums) {
-  Eigen::SelfAdjointEigenSolver<Matrix2d> of_R;
-  of_R.computeDirect(R);
-  for (int j = 0; j < 2; ++j) {
+// Of a track, `error` and its derivatives `F` by the pose and `A` by the point;
+// root G with G G' = (A'A)^-1 over the whole track.
+template <int N>
+void Add(const Eigen::Matrix<double, N, 6>& F,
+         const Eigen::Matrix<double, N, 3>& A,
+         const Eigen::Matrix<double, N, 1>& error, const Matrix3d& root,
+         PoseSums* sums) {
+  using Square = Eigen::Matrix<double, N, N>;
+  const Eigen::Matrix<double, N, 3> B = A * root;
+  const Square R =
+      Square::Identity(B.rows(), B.rows()) - Square(B * B.transpose());
+  Eigen::SelfAdjointEigenSolver<Square> of_R;
+  if constexpr (N == 2) {
+    of_R.computeDirect(R);
+  } else {
+    of_R.compute(R);
+  }
+  for (Index j = 0; j < R.rows(); ++j) {
     const double r = of_R.eigenvalues()[j];
     if (r < kControlled) continue;
-    const Vector2d direction = of_R.eigenvectors().col(j);
-    const Vector6 f = row.F.transpose() * direction;
-    const double along = direction.dot(row.error);
+    const Eigen::Matrix<double, N, 1> direction = of_R.eigenvectors().col(j);
+    const Vector6 f = F.transpose() * direction;
+    const double along = direction.dot(error);
     sums->M.noalias() += r * f * f.transpose();
     sums->g.noalias() += along * f;
     sums->square += along * along / r;
     ++sums->num_directions;
   }
+}
+
+void FindSteps(std::vector<PoseSums>* sums) {
+  for (PoseSums& one : *sums) one.step = DeterminedStep(one.M, one.g);
 }
 
 // 1 / sqrt of the smallest eigenvalue of A - B C^-1 B'; infinite if nothing
@@ -248,138 +277,69 @@ double LargestSpread(const Matrix3d& A, const Matrix3d& B, const Matrix3d& C) {
 
 }  // namespace
 
-double ImageSums::CenterSpread() const {
+double PoseSums::CenterSpread() const {
   return LargestSpread(M.bottomRightCorner<3, 3>(), M.bottomLeftCorner<3, 3>(),
                        M.topLeftCorner<3, 3>());
 }
 
-double ImageSums::TurnSpread() const {
+double PoseSums::TurnSpread() const {
   return LargestSpread(M.topLeftCorner<3, 3>(), M.topRightCorner<3, 3>(),
                        M.bottomRightCorner<3, 3>());
 }
 
-double ImageSums::GainExponent(double sigma_px) const {
+double PoseSums::GainExponent(double sigma_px) const {
   return internal::GainExponent(Gain(), square, num_directions, 6, sigma_px);
 }
 
-std::vector<ImageSums> AddUpImages(const Model& model,
-                                   const ModelNoise& noise) {
+std::vector<PoseSums> AddUpImages(const Model& model, const ModelNoise& noise) {
   const PoseRows all(model, noise);
-  std::vector<ImageSums> sums(model.images.size());
+  std::vector<PoseSums> sums(model.images.size());
   for (size_t k = 0; k < model.points3D.size(); ++k) {
     const std::vector<PoseRow> rows = all.Of(k);
     const Matrix3d root = PoseRows::RootOf(rows);
     for (const PoseRow& row : rows) {
-      const Matrix23 B = row.F.rightCols<3>() * root;
-      const Matrix2d R = Matrix2d::Identity() - B * B.transpose();
-      Add(row, R, &sums[row.image]);
+      Add<2>(row.F, row.F.rightCols<3>(), row.error, root, &sums[row.image]);
     }
   }
-  for (ImageSums& of_image : sums) {
-    of_image.step = DeterminedStep(of_image.M, of_image.g);
-  }
+  FindSteps(&sums);
   return sums;
 }
 
-namespace {
-
-// For smaller lambda the density is nearly even, and a series replaces formulas
-// that would lose digits.
-constexpr double kFlat = 1e-4;
-
-// The mean of the density lambda exp(-lambda u) / (1 - exp(-lambda)) on [0, 1].
-double MeanInDisc(double lambda) {
-  return lambda < kFlat ? 0.5 - lambda / 12
-                        : 1 / lambda - 1 / std::expm1(lambda);
-}
-
-// log(lambda / (1 - exp(-lambda))).
-double LogFactorInDisc(double lambda) {
-  return lambda < kFlat ? lambda / 2 : std::log(lambda / -std::expm1(-lambda));
-}
-
-// The same for the density f exp(-lambda u) / (2 sqrt(u)), whose factor is f.
-double LogFactorOnSegment(double lambda) {
-  if (lambda < kFlat) return lambda / 3;
-  const double root = std::sqrt(lambda);
-  return std::log(2 * root / (std::sqrt(kPi) * std::erf(root)));
-}
-
-double MeanOnSegment(double lambda) {
-  if (lambda < kFlat) return 1.0 / 3 - 4.0 / 45 * lambda;
-  return (1 - std::exp(LogFactorOnSegment(lambda) - lambda)) / (2 * lambda);
-}
-
-}  // namespace
-
-ErrorsInDisc::ErrorsInDisc(const std::vector<double>& errors_px,
-                           const std::vector<double>& errors_of_two_px,
-                           double limit_px) {
-  const auto add = [&](const std::vector<double>& errors, double weight,
-                       int64_t* count) {
-    for (const double error : errors) {
-      if (!(error <= limit_px) || limit_px == 0) continue;
-      ++*count;
-      mean_ += weight * error * error / (limit_px * limit_px);
+std::vector<PoseSums> AddUpFrames(const Model& model, const ModelNoise& noise) {
+  const bool has_rigs =
+      std::any_of(model.frames.begin(), model.frames.end(),
+                  [](const Frame& frame) { return frame.data.size() > 1; });
+  if (!has_rigs) return AddUpImages(model, noise);
+  const PoseRows all(model, noise);
+  std::vector<PoseSums> sums(model.frames.size());
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    const std::vector<PoseRow> rows = all.Of(k);
+    const Matrix3d root = PoseRows::RootOf(rows);
+    std::map<int32_t, std::vector<const PoseRow*>> of_frames;
+    for (const PoseRow& row : rows) {
+      of_frames[all.geometries()[row.image].frame].push_back(&row);
     }
-  };
-  add(errors_px, 1, &num_in_disc_);
-  add(errors_of_two_px, 2, &num_on_segment_);
-  if (num() == 0) return;
-  mean_ = std::min(MeanAt(0), mean_ / static_cast<double>(num()));
-  if (mean_ == MeanAt(0)) return;
-  double low = 0;
-  double high = 1 / std::max(mean_, std::numeric_limits<double>::min());
-  for (double middle = high / 2; low < middle && middle < high;
-       middle = low + (high - low) / 2) {
-    (MeanAt(middle) > mean_ ? low : high) = middle;
-  }
-  lambda_ = low;
-}
-
-double ErrorsInDisc::MeanAt(double lambda) const {
-  return (static_cast<double>(num_in_disc_) * MeanInDisc(lambda) +
-          2 * static_cast<double>(num_on_segment_) *
-              MeanOnSegment(2 * lambda)) /
-         static_cast<double>(num());
-}
-
-double ErrorsInDisc::LogFactors(double lambda) const {
-  return static_cast<double>(num_in_disc_) * LogFactorInDisc(lambda) +
-         static_cast<double>(num_on_segment_) * LogFactorOnSegment(2 * lambda);
-}
-
-double ErrorsInDisc::Exponent(double other) const {
-  return LogFactors(lambda_) - LogFactors(other) +
-         (other - lambda_) * mean_ * static_cast<double>(num());
-}
-
-std::vector<ErrorsInDisc> FillDiscs(const Model& model,
-                                    const std::vector<double>& errors_px) {
-  const std::vector<int32_t> image_of = ImagesOfElements(model);
-  std::vector<std::vector<double>> of_two(model.images.size());
-  std::vector<std::vector<double>> of_more(model.images.size());
-  std::vector<double> all;
-  for (const Point3D& point : model.points3D) {
-    auto& of_image =
-        point.track_end - point.track_begin == 2 ? of_two : of_more;
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      if (!std::isfinite(errors_px[e])) continue;
-      of_image[image_of[e]].push_back(errors_px[e]);
-      all.push_back(errors_px[e]);
+    for (const auto& [frame, of_frame] : of_frames) {
+      const auto size = static_cast<Index>(2 * of_frame.size());
+      Eigen::Matrix<double, Eigen::Dynamic, 6> F(size, 6);
+      Eigen::Matrix<double, Eigen::Dynamic, 3> A(size, 3);
+      Eigen::VectorXd error(size);
+      for (Index i = 0; i < size; i += 2) {
+        const PoseRow& row = *of_frame[i / 2];
+        F.middleRows<2>(i) = all.ByFrame(row);
+        A.middleRows<2>(i) = row.F.rightCols<3>();
+        error.segment<2>(i) = row.error;
+      }
+      Add<Eigen::Dynamic>(F, A, error, root, &sums[frame]);
     }
   }
-  double limit = 0;
-  if (!all.empty()) {
-    const auto rank = all.begin() + (999 * all.size() - 1) / 1000;
-    std::nth_element(all.begin(), rank, all.end());
-    limit = *rank;
+  FindSteps(&sums);
+  std::vector<PoseSums> of_images(model.images.size());
+  for (size_t n = 0; n < of_images.size(); ++n) {
+    const ImageGeometry& geometry = all.geometries()[n];
+    if (geometry.has_pose) of_images[n] = sums[geometry.frame];
   }
-  std::vector<ErrorsInDisc> discs;
-  for (size_t n = 0; n < model.images.size(); ++n) {
-    discs.emplace_back(of_more[n], of_two[n], limit);
-  }
-  return discs;
+  return of_images;
 }
 
 }  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include <Eigen/LU>
 
 #include "krot/base/parallel_for.h"
-#include "krot/base/vector_units.h"
+#include "krot/base/system.h"
 #include "krot/linear/blocks.h"
 #include "krot/linear/native_kernels.h"
 

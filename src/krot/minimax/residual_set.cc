@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "krot/base/vector_units.h"
+#include "krot/base/system.h"
 
 namespace krot::internal {
 

@@ -134,4 +134,12 @@ void UseTrivialRigs(Model* model) {
   }
 }
 
+void FollowFrames(Model* model) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(*model);
+  for (size_t n = 0; n < model->images.size(); ++n) {
+    if (!geometries[n].rig_from_world.rotation.allFinite()) continue;
+    model->images[n].cam_from_world = ToPose(geometries[n].cam_from_world);
+  }
+}
+
 }  // namespace krot::internal

@@ -186,4 +186,7 @@ std::optional<int32_t> SensorTypeFromName(std::string_view name);
 // ids of the cameras, frames those of the images.
 void UseTrivialRigs(Model* model);
 
+// Gives every image the pose that its frame and rig say.
+void FollowFrames(Model* model);
+
 }  // namespace krot::internal

@@ -1,4 +1,4 @@
-#include "krot/pipeline/checkpoint_file.h"
+#include "krot/pipeline/solve_model.h"
 
 #include <cerrno>
 #include <cstring>

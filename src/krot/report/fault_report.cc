@@ -137,7 +137,7 @@ std::string CamerasSentence(const ModelCheck& check) {
 namespace {
 
 // For example "x right, y down, z forward".
-std::string AxesWords(const Conventions& conventions) {
+std::string AxesWords(const PoseConventions& conventions) {
   constexpr const char* kDirections[] = {"left", "right",    "up",
                                          "down", "backward", "forward"};
   Eigen::Matrix3d axes = conventions.cam_from_file_axes;
@@ -152,20 +152,34 @@ std::string AxesWords(const Conventions& conventions) {
   return ListText(words);
 }
 
-// What differs from COLMAP's conventions, for example "poses from camera to
-// world".
-std::string ConventionWords(const Conventions& one) {
+// For example "poses from camera to world".
+std::vector<std::string> PoseWords(const PoseConventions& one,
+                                   const std::string& world) {
   std::vector<std::string> words;
   if (one.has_w_last) words.push_back("quaternions with w last (x, y, z, w)");
   if (one.is_world_from_cam) {
-    words.push_back(one.has_centers ? "poses from camera to world"
-                                    : "rotations from camera to world");
+    words.push_back((one.has_centers ? "poses" : "rotations") +
+                    (" from camera to " + world));
   } else if (one.has_centers) {
     words.push_back("camera centres in place of translations");
   }
   if (one.is_left_handed || !one.cam_from_file_axes.isIdentity()) {
     words.push_back(std::string(one.is_left_handed ? "left-handed " : "") +
                     "camera axes (" + AxesWords(one) + ")");
+  }
+  return words;
+}
+
+// What differs from COLMAP's conventions.
+std::string ConventionWords(const Conventions& one) {
+  std::vector<std::string> words = PoseWords(one.poses, "world");
+  std::vector<std::string> of_sensors = PoseWords(one.sensors, "rig");
+  if (one.rig_factor != 1) {
+    of_sensors.push_back("translations that must be multiplied by " +
+                         FormatNumber(one.rig_factor, 6));
+  }
+  if (!of_sensors.empty()) {
+    words.push_back("sensors in rigs with " + ListText(std::move(of_sensors)));
   }
   if (one.intrinsics_factor != 1) {
     const bool is_larger = one.intrinsics_factor < 1;
@@ -184,12 +198,17 @@ std::string ConventionWords(const Conventions& one) {
   return ListText(std::move(words));
 }
 
+Json PoseJson(const PoseConventions& one) {
+  Json json = KROT_JSON_OF(one, has_w_last, is_world_from_cam, has_centers,
+                           is_left_handed);
+  json["camera_axes"] = AxesWords(one);
+  return json;
+}
+
 }  // namespace
 
 std::string ConventionsSentence(const Conventions& one) {
-  const bool is_read_otherwise = one.HasOtherPoses() ||
-                                 one.intrinsics_factor != 1 ||
-                                 one.has_central_principal_point;
+  const bool is_read_otherwise = one.NumDifferences() > 0;
   return (is_read_otherwise
               ? "The model is not in COLMAP's conventions, but has "
               : "The model has ") +
@@ -202,12 +221,11 @@ std::string ConventionsSentence(const Conventions& one) {
 
 nlohmann::ordered_json ConventionsJson(const Conventions& one) {
   Json json = {{"words", ConventionWords(one)}};
-  json.update(KROT_JSON_OF(one, has_w_last, is_world_from_cam, has_centers,
-                           is_left_handed));
-  json["camera_axes"] = AxesWords(one);
-  json.update(KROT_JSON_OF(one, intrinsics_factor, has_central_principal_point,
-                           has_wrong_points, median_error_as_read_px,
-                           median_error_px));
+  json.update(PoseJson(one.poses));
+  json["sensors"] = PoseJson(one.sensors);
+  json.update(KROT_JSON_OF(one, rig_factor, intrinsics_factor,
+                           has_central_principal_point, has_wrong_points,
+                           median_error_as_read_px, median_error_px));
   return json;
 }
 
