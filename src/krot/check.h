@@ -269,12 +269,13 @@ enum class CameraFault {
   kPrincipalPoint,
   kDistortion,
   kPlaceInRig,
+  kImages,  // all of its images are wrong, three and more
 };
 
 // A camera that contradicts the observations of its images: another focal
 // length, principal point, distortion or place in its rig takes at least a
 // tenth of their squared errors away, with all poses and points free to move
-// along.
+// along; or images of other cameras contradict all of its own.
 struct WrongCamera {
   CameraId camera_id = 0;
   CameraFault fault = CameraFault::kFocalLength;

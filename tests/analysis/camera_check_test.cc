@@ -73,6 +73,58 @@ TEST(FindWrongCameras, FindsNoneWhereACameraIsNoisier) {
   }
 }
 
+// The images of a frame have one pose. Where they see the same points, they
+// outvote other frames, and do not speak against each other.
+TEST(AddUpFrames, FindsAFrameThatIsTurned) {
+  for (const double degrees : {0.5, 1.0, 2.0}) {
+    Model model = RigScene(3, 20, 1500);
+    Pose& pose = model.frames[9].rig_from_world;
+    pose = Turned(pose, degrees / 180 * std::acos(-1.0) * Vector3d(0.6, 0, 0.8),
+                  Vector3d::Zero());
+    const ModelCheck check = CheckModel(model);
+    for (size_t n = 0; n < model.images.size(); ++n) {
+      EXPECT_EQ(check.images[n].verdict == ImageVerdict::kWrong, n / 3 == 9)
+          << degrees << " degrees, " << check.images[n].name;
+    }
+    EXPECT_THAT(check.cameras, IsEmpty());
+  }
+}
+
+// Where the others contradict its images so clearly that all are called wrong.
+TEST(FindWrongCameras, BlamesACameraAllOfWhoseImagesAreWrong) {
+  SceneOptions options;
+  options.layout = SceneLayout::kStreet;
+  options.num_points = 3000;
+  options.pixel_noise = 0.5;
+  options.sensors_per_rig = 5;
+  options.rig_rotation_deg = 37;
+  options.rig_baseline = 0.05;
+  options.outlier_ratio = 0.1;
+  Model model = SynthesizeScene(options).ground_truth;
+  Pose& place = PlaceOf(&model, 1);
+  place = Turned(place, {0.02, 0.01, 0}, Vector3d::Zero());
+  const ModelCheck check = CheckModel(model);
+  ASSERT_THAT(check.cameras, SizeIs(1));
+  EXPECT_EQ(check.cameras[0].camera_id, model.rigs[0].sensors[1].sensor_id.id);
+  EXPECT_EQ(check.cameras[0].fault, CameraFault::kImages);
+  EXPECT_EQ(check.cameras[0].num_images, 20);
+  EXPECT_EQ(check.NumImages(ImageVerdict::kWrong), 20);
+  EXPECT_FALSE(check.is_adjusted);
+}
+
+// Steps from far off may be absurd.
+TEST(FindWrongCameras, AsksForNoNegativeFocalLength) {
+  Model model = RigScene(4, 12, 600);
+  for (size_t s = 0; s < 2; ++s) {
+    Pose& place = PlaceOf(&model, s);
+    place = Turned(place, {3, 0, 0}, Vector3d::Zero());
+  }
+  for (const WrongCamera& camera : CheckModel(model).cameras) {
+    if (camera.fault != CameraFault::kFocalLength) continue;
+    EXPECT_GT(camera.asked_focal_length_px, 0);
+  }
+}
+
 // All images of that camera look misplaced, and those of its neighbours.
 TEST(FindWrongCameras, FindsACameraThatIsTurnedInItsRig) {
   for (const double degrees : {0.5, 2.0, 5.0}) {

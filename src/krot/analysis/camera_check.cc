@@ -230,7 +230,10 @@ class CameraChecker {
         if (is_free[i]) continue;
         const SharedGroup& group = Groups()[i];
         const double gain = system.GainOf(group);
-        if (gain <= most || !IsWrong(gain, group)) continue;
+        if (gain <= most || !IsWrong(gain, group) ||
+            !IsPossible(system.StepOf(group), group)) {
+          continue;
+        }
         best = &group;
         most = gain;
       }
@@ -255,6 +258,17 @@ class CameraChecker {
     return group.num_images >= least_num_images_ &&
            gain > least * group.square &&
            ExponentOf(gain, group) > least_exponent_;
+  }
+
+  // Far from the truth a step may ask for a negative focal length.
+  bool IsPossible(const VectorXd& step, const SharedGroup& group) const {
+    if (group.fault != CameraFault::kFocalLength) return true;
+    for (Index i = 0; i < group.size; ++i) {
+      if (model_.cameras[group.camera].params[group.params[i]] + step[i] <= 0) {
+        return false;
+      }
+    }
+    return true;
   }
 
   double ExponentOf(double gain, const SharedGroup& group) const {
@@ -322,6 +336,7 @@ class CameraChecker {
         wrong.offset_px = step.norm();
         break;
       case CameraFault::kDistortion:
+      case CameraFault::kImages:
         break;
       case CameraFault::kPlaceInRig:
         wrong.turn_deg = kDegreesPerRadian * step.head<3>().norm();
@@ -349,6 +364,28 @@ std::vector<WrongCamera> FindWrongCameras(const Model& model,
                                           double false_alarm, int num_threads) {
   return CameraChecker(model, noise, least_num_images, false_alarm, num_threads)
       .Run();
+}
+
+void AddCamerasOfWrongImages(const Model& model, ModelCheck* check) {
+  struct Images {
+    int64_t num_wrong = 0, num_others = 0;
+  };
+  std::map<CameraId, Images> images_of;
+  for (size_t n = 0; n < model.images.size(); ++n) {
+    const ImageCheck& image = check->images[n];
+    if (image.num_observations == 0) continue;
+    Images& images = images_of[model.images[n].camera_id];
+    ++(image.verdict == ImageVerdict::kWrong ? images.num_wrong
+                                             : images.num_others);
+  }
+  for (const auto& [camera_id, images] : images_of) {
+    if (images.num_others > 0 || images.num_wrong < 3) continue;
+    WrongCamera& camera = check->cameras.emplace_back();
+    camera.camera_id = camera_id;
+    camera.fault = CameraFault::kImages;
+    camera.num_images = images.num_wrong;
+    check->is_adjusted = false;
+  }
 }
 
 }  // namespace krot::internal

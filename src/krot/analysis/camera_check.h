@@ -125,4 +125,8 @@ std::vector<WrongCamera> FindWrongCameras(const Model& model,
                                           int least_num_images,
                                           double false_alarm, int num_threads);
 
+// Adds to check->cameras those of which all images, at least three, are wrong:
+// that is no chance. Requires the images' verdicts. O(images).
+void AddCamerasOfWrongImages(const Model& model, ModelCheck* check);
+
 }  // namespace krot::internal

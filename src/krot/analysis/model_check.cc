@@ -65,6 +65,7 @@ class Checker {
     }
     const int64_t num_wrong = check_.NumImages(ImageVerdict::kWrong);
     if (num_wrong > 0 && !judges_cameras) JudgeCameras();
+    AddCamerasOfWrongImages(model_, &check_);
     Describe();
     FindSecondPoints();
     HowFirmly();

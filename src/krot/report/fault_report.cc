@@ -32,7 +32,8 @@ const char* CameraFaultName(CameraFault fault) {
   return NameIn<Enum>({{Enum::kFocalLength, "focal length"},
                        {Enum::kPrincipalPoint, "principal point"},
                        {Enum::kDistortion, "distortion"},
-                       {Enum::kPlaceInRig, "place in rig"}},
+                       {Enum::kPlaceInRig, "place in rig"},
+                       {Enum::kImages, "images"}},
                       fault);
 }
 
@@ -58,6 +59,9 @@ std::string CameraFaultWords(const WrongCamera& camera) {
       return ask + "another place in its rig, turned by about " +
              FormatNumber(camera.turn_deg, 2) + " degrees and moved by about " +
              FormatLength(camera.shift);
+    case CameraFault::kImages:
+      return "all of its " + Counted(camera.num_images, "image") +
+             " are wrong, so its lens or its place in a rig may be";
   }
   return "";
 }
@@ -234,7 +238,10 @@ std::string CameraTable(const ModelCheck& check, size_t max_rows) {
       "Wrong cameras", {"camera", "images", "squared errors that go, %", "why"},
       check.cameras, max_rows, [](const WrongCamera& camera) -> Row {
         return {camera.camera_id, camera.num_images,
-                FormatNumber(100 * camera.gain, 0), CameraFaultWords(camera)};
+                camera.fault == CameraFault::kImages
+                    ? ""
+                    : FormatNumber(100 * camera.gain, 0),
+                CameraFaultWords(camera)};
       });
 }
 
@@ -243,11 +250,13 @@ nlohmann::ordered_json CamerasJson(const ModelCheck& check) {
     const auto only = [&](CameraFault fault, const Json& values) {
       return KnownIf(camera.fault == fault, values);
     };
-    Json json = {{"camera_id", camera.camera_id},
-                 {"fault", CameraFaultName(camera.fault)},
-                 {"reason", CameraFaultWords(camera)},
-                 {"num_images", camera.num_images},
-                 {"gain", camera.gain}};
+    Json json = {
+        {"camera_id", camera.camera_id},
+        {"fault", CameraFaultName(camera.fault)},
+        {"reason", CameraFaultWords(camera)},
+        {"num_images", camera.num_images},
+        {"gain",
+         camera.fault == CameraFault::kImages ? Json() : Json(camera.gain)}};
     json.update(
         only(CameraFault::kFocalLength,
              KROT_JSON_OF(camera, focal_length_px, asked_focal_length_px)));
