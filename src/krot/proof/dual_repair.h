@@ -8,7 +8,6 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 
 #include "krot/conic/interior_point.h"
 #include "krot/geometry.h"
@@ -17,57 +16,6 @@
 #include "krot/verify/certificate_check.h"
 
 namespace krot::internal {
-
-// QR factorisation by Householder reflections of a matrix whose blocks share
-// columns,
-//
-//   A = [ P_0            F_0 ]        P_k, F_k have the same rows; P_k may
-//       [      P_1       F_1 ]        have no columns, F_k is mostly zeros
-//       [           .     :  ]
-//
-// First each P_k is factorised by itself, then what is left of the shared
-// columns:
-//
-//   Q_k' [P_k  F_k] = [ R_k  G_k ]        H_0
-//                     [  0   H_k ]        H_1  = Q R
-//                                          :
-//
-// It is as accurate as for a dense matrix, but the cost grows only with the
-// square of the number of shared columns.
-class BlockAngularQr {
- public:
-  explicit BlockAngularQr(int64_t num_shared_columns);
-
-  // Adds the next block: P_k, and the nonzero columns of F_k with their
-  // indices, ascending. P_k must have at least as many rows as columns.
-  void Append(const Eigen::MatrixXd& own, std::vector<int64_t> columns,
-              const Eigen::MatrixXd& shared);
-
-  // Call it after all blocks were added. False unless the columns of A are
-  // independent beyond rounding.
-  bool Factorize();
-
-  // The x of least norm with A'x = rhs, which is ordered like the columns of A:
-  // the blocks' own, then the shared ones.
-  Eigen::VectorXd SolveLeastNorm(const Eigen::VectorXd& rhs) const;
-
- private:
-  using Qr = Eigen::HouseholderQR<Eigen::MatrixXd>;
-
-  struct Block {
-    Qr qr;  // of P_k
-    std::vector<int64_t> columns;
-    Eigen::MatrixXd shared;  // [G_k; H_k] in these columns
-    int64_t num_own() const { return qr.cols(); }
-    int64_t num_rest() const { return qr.rows() - qr.cols(); }
-  };
-
-  bool is_independent_ = true;
-  std::vector<Block> blocks_;
-  int64_t num_rest_ = 0;             // rows of H
-  Eigen::VectorXd squared_lengths_;  // of the shared columns
-  Qr rest_;
-};
 
 // Under-determined equations M x = rhs with the structure of the known rotation
 // problem: three equations per point that is not fixed, three per frame except
@@ -114,18 +62,13 @@ struct LeastNormProblem {
 //   obs 3  [      P         |           -P   | l ]
 //   obs 4  [           P    | -P             | l ]
 //
-// Up to `max_dense_rows` it uses Householder reflections (BlockAngularQr), as
-// the multipliers span many decades. Beyond that it eliminates the points,
-// which leaves the normal equations of the frames; the last column is replaced
-// by its part outside the span of all others.
+// The points are eliminated, which leaves the normal equations of the frames;
+// the last column is replaced by its part outside the span of all others.
 //
 // Usage: Factorize once and then, if it succeeded, Solve as often as necessary.
 class LeastNormSolver {
  public:
-  // The cost of the dense solution is proportional to the number of rows and
-  // to the square of the number of frames.
-  explicit LeastNormSolver(int num_threads, int64_t max_dense_rows = 1500)
-      : num_threads_(num_threads), max_dense_rows_(max_dense_rows) {}
+  explicit LeastNormSolver(int num_threads) : num_threads_(num_threads) {}
 
   // False if the equations may have no solution.
   bool Factorize(LeastNormProblem problem);
@@ -134,19 +77,10 @@ class LeastNormSolver {
   Eigen::VectorXd Solve(const Eigen::VectorXd& rhs) const;
 
  private:
-  bool FactorizeDense();
-  void AppendPoint(size_t begin, size_t end);
-  bool FactorizeByPoints();
-  Eigen::VectorXd SolveByPoints(const Eigen::VectorXd& rhs) const;
-
   const int num_threads_;
-  const int64_t max_dense_rows_;
   LeastNormProblem problem_;
-  // The dense solution: a factorisation of M'.
-  std::optional<BlockAngularQr> qr_;
-  // The solution by eliminating points.
   BlockStructure structure_;
-  std::unique_ptr<CentredLeastSquares<3>> by_points_;
+  std::unique_ptr<CentredLeastSquares<3>> equations_;  // M'
   Eigen::VectorXd last_row_;  // without its part in the span of the others
   double last_row_norm2_ = 0;
 };
