@@ -58,11 +58,6 @@ class FileDescriptor {
 // tried, because root's permissions say nothing about /proc or a read-only
 // disk; nothing remains.
 std::error_code TryToCreateIn(const std::filesystem::path& folder);
-// Appends the names in a folder, in no particular order.
-std::error_code ListEntries(const std::filesystem::path& folder,
-                            std::vector<std::filesystem::path>* names);
-// Removes a file, a link or an empty folder.
-std::error_code RemoveEntry(const std::filesystem::path& path);
 // Forces the names in a folder to the disk, if that is left to programs and the
 // folder may be read.
 std::error_code SyncEntries(const std::filesystem::path& folder);

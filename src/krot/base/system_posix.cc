@@ -1,4 +1,3 @@
-#include <dirent.h>
 #include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
@@ -15,7 +14,6 @@
 #include <cerrno>
 #include <fstream>
 #include <limits>
-#include <memory>
 
 #include "krot/base/system.h"
 
@@ -117,25 +115,6 @@ std::error_code TryToCreateIn(const fs::path& folder) {
       ::mkdir(named.c_str(), mode_t{0700}) == 0 || errno == EEXIST;
   if (is_there && ::rmdir(named.c_str()) == 0) return {};
   return LastError();
-}
-
-std::error_code ListEntries(const fs::path& folder,
-                            std::vector<fs::path>* names) {
-  const std::unique_ptr<DIR, int (*)(DIR*)> stream(::opendir(folder.c_str()),
-                                                   &::closedir);
-  if (!stream) return LastError();
-  for (;;) {
-    errno = 0;
-    const dirent* entry = ::readdir(stream.get());
-    if (entry == nullptr) break;
-    const std::string_view name = entry->d_name;
-    if (name != "." && name != "..") names->emplace_back(name);
-  }
-  return errno == 0 ? std::error_code() : LastError();
-}
-
-std::error_code RemoveEntry(const fs::path& path) {
-  return ::remove(path.c_str()) == 0 ? std::error_code() : LastError();
 }
 
 std::error_code SyncEntries(const fs::path& folder) {

@@ -61,10 +61,6 @@ namespace fs = std::filesystem;
 
 constexpr int kStderr = 2;
 
-std::error_code LastSystemError() {
-  return {static_cast<int>(::GetLastError()), std::system_category()};
-}
-
 int Open(const fs::path& file, FileDescriptor::Use use) {
   int flags = _O_RDONLY;
   if (use == FileDescriptor::Use::kReplace) {
@@ -157,29 +153,6 @@ std::error_code TryToCreateIn(const fs::path& folder) {
   fs::create_directory(named, error);
   if (!error) fs::remove(named, error);
   return error;
-}
-
-std::error_code ListEntries(const fs::path& folder,
-                            std::vector<fs::path>* names) {
-  WIN32_FIND_DATAW entry;
-  const std::unique_ptr<void, BOOL(WINAPI*)(HANDLE)> search(
-      ::FindFirstFileW((folder / "*").c_str(), &entry), &::FindClose);
-  if (search.get() == INVALID_HANDLE_VALUE) return LastSystemError();
-  do {
-    const std::wstring_view name = entry.cFileName;
-    if (name != L"." && name != L"..") names->emplace_back(name);
-  } while (::FindNextFileW(search.get(), &entry) != 0);
-  return ::GetLastError() == ERROR_NO_MORE_FILES ? std::error_code()
-                                                 : LastSystemError();
-}
-
-std::error_code RemoveEntry(const fs::path& path) {
-  const DWORD attributes = ::GetFileAttributesW(path.c_str());
-  if (attributes == INVALID_FILE_ATTRIBUTES) return LastSystemError();
-  const BOOL is_removed = (attributes & FILE_ATTRIBUTE_DIRECTORY) != 0
-                              ? ::RemoveDirectoryW(path.c_str())
-                              : ::DeleteFileW(path.c_str());
-  return is_removed != 0 ? std::error_code() : LastSystemError();
 }
 
 // Nothing to do: NTFS keeps a log of names.

@@ -103,6 +103,21 @@ void SyncFolder(const fs::path& folder) {
   }
 }
 
+namespace {
+
+// Appends the names in a folder, in no particular order.
+std::error_code ListEntries(const fs::path& folder,
+                            std::vector<fs::path>* names) {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    names->push_back(entry->path().filename());
+  }
+  return error;
+}
+
+}  // namespace
+
 std::vector<fs::path> FolderEntries(const fs::path& folder) {
   std::vector<fs::path> names;
   if (const std::error_code error = ListEntries(folder, &names)) {
@@ -123,7 +138,8 @@ std::error_code RemoveTree(const fs::path& path) try {
       if (!failure) failure = error;
     }
   }
-  const std::error_code error = RemoveEntry(path);
+  std::error_code error;
+  fs::remove(path, error);
   return failure ? failure : error;
 } catch (const std::bad_alloc&) {
   return std::make_error_code(std::errc::not_enough_memory);
