@@ -126,29 +126,6 @@ TEST(BuildProblem, SaysWhereEachObservationCameFrom) {
   }
 }
 
-TEST(BuildProblem, HasTheSameBitsAtAnyNumberOfThreads) {
-  SceneOptions options = RigScene();
-  options.num_points = 2000;
-  options.camera_model_id = FindCameraModel("OPENCV_FISHEYE")->id;
-  options.outlier_ratio = 0.1;
-  const Model model = SynthesizeScene(options).model;
-  const BuiltProblem one = BuildProblem(model, {2, 1});
-  for (const int num_threads : {2, 5}) {
-    const BuiltProblem many = BuildProblem(model, {2, num_threads});
-    ASSERT_EQ(many.problem.observations.size(),
-              one.problem.observations.size());
-    for (size_t i = 0; i < one.problem.observations.size(); ++i) {
-      const Observation& a = one.problem.observations[i];
-      const Observation& b = many.problem.observations[i];
-      ASSERT_TRUE(a.E == b.E && a.view == b.view && a.point == b.point);
-    }
-    EXPECT_EQ(many.start.points, one.start.points);
-    EXPECT_EQ(many.point2D_of, one.point2D_of);
-    EXPECT_EQ(many.pixels, one.pixels);
-    EXPECT_EQ(many.left_out, one.left_out);
-  }
-}
-
 TEST(BuildProblem, KeepsBothOfTwoObservationsByOneImage) {
   SceneOptions options = SmallScene();
   options.duplicate_ratio = 0.5;
