@@ -181,13 +181,5 @@ TEST(BarrierSystem, DescendsTheBarrierCostAtTheRateOfItsGradient) {
   }
 }
 
-TEST(BarrierSystem, HasTheSameBitsAtAnyNumberOfThreads) {
-  const Iterate at({}, true);
-  const VectorXd expected = Stack(at.Solved()->direction().unknowns);
-  for (const int num_threads : {2, 3, 8}) {
-    EXPECT_EQ(Stack(at.Solved(num_threads)->direction().unknowns), expected);
-  }
-}
-
 }  // namespace
 }  // namespace krot::internal

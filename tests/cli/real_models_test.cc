@@ -168,7 +168,8 @@ INSTANTIATE_TEST_SUITE_P(
         RealModel{"door_colmap", 3.4205}, RealModel{"fountain11", 3.2858},
         RealModel{"longtracks92", 3.4528}, RealModel{"maupertuis4_txt", 2.5369},
         RealModel{"outliers12", 18.9275}, RealModel{"room50_opencv", 3.6473},
-        RealModel{"south128", 3.1778}, RealModel{"south128_full", 3.5773},
+        RealModel{"slow28", 2.8965}, RealModel{"south128", 3.1778},
+        RealModel{"south128_full", 3.5773},
         RealModel{"task41_rigs_frames", 3.5041}, RealModel{"tower", 4.6315},
         RealModel{"tower_init", 4.6315}, RealModel{"two_cameras44", 2.9279}),
     NameOf);
@@ -209,8 +210,11 @@ TEST_P(StartOnRealModel, WithoutTranslationsGivesTheOptimum) {
 
 INSTANTIATE_TEST_SUITE_P(Local, StartOnRealModel,
                          ::testing::Values(RealModel{"crane8_txt", 3.1011},
+                                           RealModel{"fountain11", 3.2858},
+                                           RealModel{"longtracks92", 3.4528},
                                            RealModel{"maupertuis4_txt", 2.5369},
                                            RealModel{"room50_opencv", 3.6473},
+                                           RealModel{"south128", 3.1778},
                                            RealModel{"task41_rigs_frames",
                                                      3.5041},
                                            RealModel{"two_cameras44", 2.9279}),

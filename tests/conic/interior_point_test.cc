@@ -134,31 +134,6 @@ TEST_P(InteriorPoint, IsThereSoonerFromKnownMultipliers) {
   }
 }
 
-TEST_P(InteriorPoint, HasTheSameBitsAtAnyNumberOfThreads) {
-  const RandomScene scene = MakeScene(6, 2000);  // several chunks
-  Estimate expected;
-  std::vector<Multiplier> expected_multipliers;
-  for (const int num_threads : {1, 2, 3}) {
-    InteriorPointOptions options = Options(norm());
-    options.max_iterations = 12;
-    Estimate estimate = scene.estimate;
-    std::vector<Multiplier> multipliers;
-    MinimizeJointly(scene.problem, options, {num_threads}, &estimate,
-                    &multipliers);
-    if (num_threads == 1) {
-      expected = estimate;
-      expected_multipliers = multipliers;
-    }
-    EXPECT_EQ(estimate.translations, expected.translations);
-    EXPECT_EQ(estimate.points, expected.points);
-    ASSERT_EQ(multipliers.size(), expected_multipliers.size());
-    for (size_t i = 0; i < multipliers.size(); ++i) {
-      EXPECT_EQ(multipliers[i].lambda, expected_multipliers[i].lambda);
-      EXPECT_EQ(multipliers[i].y, expected_multipliers[i].y);
-    }
-  }
-}
-
 TEST_P(InteriorPoint, DoesNotMoveTheScaleOrTheFrameThatSeesMost) {
   // All frames see as much: the first one is held.
   RandomScene scene = MakeScene(7, 30);

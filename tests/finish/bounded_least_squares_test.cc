@@ -197,19 +197,6 @@ TEST_P(BoundedLeastSquares, HoldsTheFrameThatSeesMost) {
   EXPECT_EQ(estimate.translations[0], solved.scene.estimate.translations[0]);
 }
 
-TEST_P(BoundedLeastSquares, HasTheSameBitsAtAnyNumberOfThreads) {
-  SolvedScene solved = Solve(6, norm(), 1500);
-  Estimate expected;
-  for (const int num_threads : {1, 2, 3}) {
-    Estimate estimate = solved.scene.estimate;
-    MinimizeBounded(solved.scene.problem, OptionsFor(solved, norm()),
-                    {num_threads}, &estimate);
-    if (num_threads == 1) expected = estimate;
-    EXPECT_EQ(estimate.translations, expected.translations);
-    EXPECT_EQ(estimate.points, expected.points);
-  }
-}
-
 // Two components at once: each has its own gauge.
 TEST_P(BoundedLeastSquares, SolvesComponentsAsIfEachWereAlone) {
   const SolvedScene first = Solve(7, norm());

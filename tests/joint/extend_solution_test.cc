@@ -112,18 +112,5 @@ TEST(ExtendSolution, LeavesPointsThatNoPlacePutsInFrontAndFails) {
   EXPECT_EQ(extended.points[outside], solved.estimate.points[outside]);
 }
 
-TEST(ExtendSolution, HasTheSameBitsAtAnyNumberOfThreads) {
-  const Solved solved(3, 200, 15);
-  Estimate expected;
-  for (const int num_threads : {1, 2, 3}) {
-    Estimate extended = solved.estimate;
-    ExtendSolution(solved.scene.problem, Norm::L2(), {num_threads},
-                   solved.level, kRoom * solved.level, &extended);
-    if (num_threads == 1) expected = extended;
-    EXPECT_EQ(extended.points, expected.points);
-    EXPECT_EQ(extended.translations, expected.translations);
-  }
-}
-
 }  // namespace
 }  // namespace krot::internal

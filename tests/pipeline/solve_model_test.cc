@@ -348,8 +348,12 @@ TEST(SolveModel, MeasuresPixelErrorsBeforeAndAfterAndStoresThem) {
   EXPECT_THAT(result.model, IsModel(updated));
 }
 
+// Large enough for loops of several chunks, and for threads in factors.
 TEST(SolveModel, GivesTheSameBitsAtAnyNumberOfThreads) {
-  const Model model = SynthesizeScene(NoisyScene()).model;
+  SceneOptions scene = NoisyScene();
+  scene.num_points = 2500;
+  scene.camera_model_id = FindCameraModel("OPENCV_FISHEYE")->id;
+  const Model model = SynthesizeScene(scene).model;
   for (const SolveInit init : {SolveInit::kModel, SolveInit::kFeasible}) {
     SolveModelOptions options;
     options.init = init;

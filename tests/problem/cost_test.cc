@@ -89,16 +89,6 @@ TEST(Cost, IsTheLargestResidual) {
   }
 }
 
-TEST(Cost, HasTheSameBitsAtAnyNumberOfThreads) {
-  const RandomScene scene = MakeRandomScene(
-      {/*num_frames=*/10, /*num_points=*/5000, /*views_per_frame=*/1,
-       /*baseline=*/0, /*seed=*/3});
-  const double cost = Cost(scene.problem, scene.estimate, Norm{3}, 1);
-  for (const int num_threads : {2, 3, 8, -1}) {
-    EXPECT_EQ(Cost(scene.problem, scene.estimate, Norm{3}, num_threads), cost);
-  }
-}
-
 TEST(Cost, IsInfiniteIfOnePointIsBehindOneCamera) {
   RandomScene scene = MakeRandomScene({});
   scene.estimate.points.back().z() = -10;

@@ -94,20 +94,6 @@ TEST_P(ResIntTest, NeverRaisesTheCostAndReportsWhatItReached) {
   EXPECT_NEAR(previous, summary.cost_final, kCostRounding);
 }
 
-TEST_P(ResIntTest, GivesTheSameBitsAtAnyNumberOfThreads) {
-  const RandomScene scene = MakeScene(2);
-  ResIntOptions options = Options();
-  Estimate one = scene.estimate;
-  const double cost = SolveResInt(scene.problem, options, {1}, &one).cost_final;
-  for (const int threads : {2, 3}) {
-    Estimate estimate = scene.estimate;
-    EXPECT_EQ(
-        SolveResInt(scene.problem, options, {threads}, &estimate).cost_final,
-        cost);
-    ExpectSameBits(estimate, one);
-  }
-}
-
 TEST_P(ResIntTest, SaysStalledOnlyAfterIdleSweeps) {
   RandomScene scene = MakeScene(1);
   ResIntOptions options = Options();
