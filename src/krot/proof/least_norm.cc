@@ -1,10 +1,9 @@
 #include "krot/proof/dual_repair.h"
 
-#include <algorithm>
-#include <limits>
 #include <utility>
 
 namespace krot::internal {
+
 using Eigen::VectorXd;
 
 std::vector<int64_t> LeastNormProblem::EquationsOfPoints() const {
