@@ -85,7 +85,7 @@ class TrackSample {
            std::max(kFilteredPx, kClearly * from.median_error_px);
   }
 
-  // The simplest of those with the least errors; they have the same lenses.
+  // The simplest within a fifth of the lowest error; all have the same lenses.
   Conventions SimplestOfBest(std::vector<Conventions> all,
                              const Context& context) const {
     const Lenses lenses = LensesIn(all.front());
@@ -100,7 +100,7 @@ class TrackSample {
     });
     const Conventions* simplest = &all.front();
     for (const Conventions& one : all) {
-      if (one.median_error_px > 2 * all.front().median_error_px) break;
+      if (one.median_error_px > 1.2 * all.front().median_error_px) break;
       if (one.NumDifferences() < simplest->NumDifferences()) simplest = &one;
     }
     return *simplest;
