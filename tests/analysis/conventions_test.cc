@@ -39,6 +39,21 @@ struct Program {
   bool writes_camera_to_world, writes_centers, writes_w_last;
 };
 
+Pose Written(const Program& program, const Pose& pose,
+             const Matrix3d& world_from_file) {
+  Matrix3d rotation =
+      program.axes.transpose() * pose.Rotation() * world_from_file;
+  Vector3d translation = program.axes.transpose() * pose.translation;
+  if (program.writes_centers) translation = -rotation.transpose() * translation;
+  if (program.writes_camera_to_world) rotation.transposeInPlace();
+  Pose written = ToPose({rotation, translation});
+  if (program.writes_w_last) {
+    const auto [w, x, y, z] = written.quaternion_wxyz;
+    written.quaternion_wxyz = {x, y, z, w};
+  }
+  return written;
+}
+
 // The model in that program's numbers. In a left-handed one the world's y is
 // turned round, too.
 Model WrittenBy(const Program& program, Model model) {
@@ -48,17 +63,7 @@ Model WrittenBy(const Program& program, Model model) {
   for (Point3D& point : model.points3D) point.xyz = world_from_file * point.xyz;
   for (Frame& frame : model.frames) {
     Pose& pose = frame.rig_from_world;
-    Matrix3d rotation =
-        program.axes.transpose() * pose.Rotation() * world_from_file;
-    Vector3d translation = program.axes.transpose() * pose.translation;
-    if (program.writes_centers)
-      translation = -rotation.transpose() * translation;
-    if (program.writes_camera_to_world) rotation.transposeInPlace();
-    pose = ToPose({rotation, translation});
-    if (program.writes_w_last) {
-      const auto [w, x, y, z] = pose.quaternion_wxyz;
-      pose.quaternion_wxyz = {x, y, z, w};
-    }
+    pose = Written(program, pose, world_from_file);
   }
   return model;
 }
@@ -101,17 +106,7 @@ TEST(FindConventions, FindsNoneWherePosesAreWrongInDifferentWays) {
 Model SensorsWrittenBy(const Program& program, Model model) {
   for (RigSensor& sensor : model.rigs[0].sensors) {
     Pose& pose = *sensor.sensor_from_rig;
-    Matrix3d rotation =
-        program.axes.transpose() * pose.Rotation() * program.axes;
-    Vector3d translation = program.axes.transpose() * pose.translation;
-    if (program.writes_centers)
-      translation = -rotation.transpose() * translation;
-    if (program.writes_camera_to_world) rotation.transposeInPlace();
-    pose = ToPose({rotation, translation});
-    if (program.writes_w_last) {
-      const auto [w, x, y, z] = pose.quaternion_wxyz;
-      pose.quaternion_wxyz = {x, y, z, w};
-    }
+    pose = Written(program, pose, program.axes);
   }
   return model;
 }

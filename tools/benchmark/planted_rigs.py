@@ -8,8 +8,8 @@ frames of a rig of three cameras 10 degrees apart, and "street", 20 of one of
 five cameras 37 degrees apart with a tenth of the observations wrong. In SEEDS
 (10) of each
 
-* the frame in the middle is turned about its centre or moved by so much of the
-  viewing distance: prints how many of the images of that frame are called
+* the frame in the middle is turned about its centre, turned about the middle
+  of the scene, or moved by so much of the viewing distance: prints how many of the images of that frame are called
   wrong, and how many others;
 * sensors, or frames, or both, are written as by each of 384 programs (see
   planted_conventions.py), or the rig in another unit: prints how many are
@@ -67,12 +67,13 @@ def random_direction(rng):
     return [x / math.hypot(*v) for x in v]
 
 
-def turned(degrees, axis):
+def turned(degrees, axis, is_about_scene=False):
     half = math.radians(degrees) / 2
     turn = [math.cos(half), *(math.sin(half) * x for x in axis)]
 
     def change(pose):
-        return list(multiply(turn, pose[:4])) + applied(rotation(*turn), pose[4:])
+        t = pose[4:] if is_about_scene else applied(rotation(*turn), pose[4:])
+        return list(multiply(turn, pose[:4])) + t
     return change
 
 
@@ -167,6 +168,9 @@ def main():
             for degrees in (0.1, 0.2, 0.5, 1, 2, 5):
                 frames_row(krot, folder, scene, seeds, f"turned by {degrees}°",
                            lambda rng, d=degrees: turned(d, random_direction(rng)))
+                frames_row(krot, folder, scene, seeds,
+                           f"turned by {degrees}° about the scene",
+                           lambda rng, d=degrees: turned(d, random_direction(rng), True))
             for percent in (0.2, 0.5, 1, 5):
                 frames_row(krot, folder, scene, seeds, f"moved by {percent} %",
                            lambda rng, p=percent: moved(

@@ -29,8 +29,8 @@ using Eigen::Vector3d;
 constexpr double kClearly = 4;
 constexpr double kFits = 0.01;
 constexpr size_t kNumTracks = 200;  // that are asked, evenly spread
-// So many tracks, or so many observations of a sensor, tell something.
-constexpr size_t kFewest = 10;
+constexpr size_t kFewest =
+    10;  // tracks, or observations of a sensor, that tell
 
 struct Sight {
   int32_t image = -1;
@@ -184,10 +184,9 @@ class TrackSample {
     }
   }
 
-  const std::optional<Roles::Role>& RoleOf(int32_t image) const {
-    static const std::optional<Roles::Role> kNone;
+  std::optional<Roles::Role> RoleOf(int32_t image) const {
     const ImageGeometry& geometry = geometries_[image];
-    if (!geometry.has_pose) return kNone;
+    if (!geometry.has_pose) return std::nullopt;
     return geometry.sensor < 0 ? roles_.of_references : roles_.of_others;
   }
 
@@ -208,7 +207,7 @@ class TrackSample {
 
   void AddSight(int32_t image, const Eigen::Vector2d& pixel,
                 std::vector<Sight>* track) const {
-    const auto& role = RoleOf(image);
+    const auto role = RoleOf(image);
     if (role) {
       track->push_back({image, pixel, role->is_anchor, role->is_asked});
     }
@@ -293,9 +292,8 @@ class TrackSample {
                                                 poses[sight.image] * *place)
                                  : std::nullopt;
         const double error = pixel ? (*pixel - sight.pixel).norm() : kInfinity;
-        const bool is_reference = geometry.sensor < 0;
-        errors[{is_reference ? -1 : geometry.rig, geometry.sensor}].push_back(
-            std::fmin(error, largest_px_));
+        errors[{geometry.sensor < 0 ? -1 : geometry.rig, geometry.sensor}]
+            .push_back(std::fmin(error, largest_px_));
       }
     }
     double largest = 0;
@@ -322,7 +320,6 @@ std::optional<Conventions> FindPoses(const TrackSample& sample,
   const double as_read = sample.MedianErrorWithPoints({});
   if (as_read <= kFilteredPx) return Conventions();
   const double seen = sample.MedianErrorWhereSeen({});
-  // COLMAP's own first.
   for (const double factor : {1.0, 0.5, 2.0, 0.25, 4.0, 0.125, 8.0}) {
     for (const bool is_central : {false, true}) {
       std::vector<Conventions> all;
@@ -388,11 +385,14 @@ std::optional<Conventions> FindConventions(const Model& model,
   auto found =
       FindPoses({model, geometries, kReferencesAlone, database}, context);
   if (!found) return std::nullopt;
-  const TrackSample placed(model, geometries, kOthersAtReferences, nullptr);
-  found =
-      placed.num_tracks() < kFewest
-          ? FindSensors({model, geometries, kOthers, database}, *found, context)
-          : FindSensors(placed, *found, context);
+  if (std::any_of(geometries.begin(), geometries.end(),
+                  [](const ImageGeometry& one) { return one.sensor >= 0; })) {
+    TrackSample others(model, geometries, kOthersAtReferences, nullptr);
+    found = others.num_tracks() < kFewest
+                ? FindSensors({model, geometries, kOthers, database}, *found,
+                              context)
+                : FindSensors(others, *found, context);
+  }
   const bool differs = found->NumDifferences() > 0 || found->has_wrong_points;
   return differs ? found : std::nullopt;
 }

@@ -4,8 +4,6 @@
 
 #include <Eigen/Core>
 
-#include "krot/analysis/model_input.h"
-#include "krot/analysis/noise.h"
 #include "krot/camera/camera_model.h"
 #include "krot/check.h"
 #include "krot/geometry/transform.h"
