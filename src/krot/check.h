@@ -137,6 +137,9 @@ struct Conventions {
   // as they are those of photos of another size than the 2D points.
   double intrinsics_factor = 1;
   bool has_central_principal_point = false;  // though the file says otherwise
+  // Takes the axes of the file's 2D points to COLMAP's, x right and y down, as
+  // others count from another corner of the photo, or rows first.
+  Eigen::Matrix2d pixel_from_file_axes = Eigen::Matrix2d::Identity();
   // The 3D points are not where their images see them.
   bool has_wrong_points = false;
 
@@ -147,14 +150,19 @@ struct Conventions {
   double median_error_as_read_px = 0;
   double median_error_px = 0;
 
+  // All axes of 2D points that are tried, COLMAP's first.
+  static std::vector<Eigen::Matrix2d> AllPixelAxes();
+
   // How many things differ from COLMAP's; points are another matter.
   int NumDifferences() const;
 
-  // A pose of an image or a frame, one of a sensor in its rig, a camera, and a
-  // 3D point in COLMAP's conventions.
+  // A pose of an image or a frame, one of a sensor in its rig, a camera, a 2D
+  // point of a converted camera, and a 3D point in COLMAP's conventions.
   Pose ToColmap(const Pose& pose) const;
   Pose SensorToColmap(const Pose& sensor_from_rig) const;
   Camera ToColmap(const Camera& camera) const;
+  Eigen::Vector2d ToColmap(const Eigen::Vector2d& pixel,
+                           const Camera& camera) const;
   Eigen::Vector3d ToColmap(const Eigen::Vector3d& xyz) const;
 };
 

@@ -180,6 +180,64 @@ TEST(FindConventions, FindsIntrinsicsOfPhotosOfAnotherSize) {
   }
 }
 
+// Pixels that count from another corner, or rows first. Where the principal
+// point is not in the middle of the photo, no other poses fit as well.
+TEST(FindConventions, FindsHowOtherProgramsCountPixels) {
+  const Model model = [] {
+    Model scene = SceneOfColmap(8, /*outlier_ratio=*/0.1);
+    const Eigen::Vector2d offset(60, -40);
+    scene.cameras[0].params[1] += offset.x();
+    scene.cameras[0].params[2] += offset.y();
+    for (Image& image : scene.images) {
+      for (Point2D& point : image.points2D) {
+        point.x += offset.x();
+        point.y += offset.y();
+      }
+    }
+    return scene;
+  }();
+  const double width = static_cast<double>(model.cameras[0].width);
+  const double height = static_cast<double>(model.cameras[0].height);
+  const std::vector<double> before = PixelErrors(model);
+  using Writes = Point2D (*)(double x, double y, double width, double height);
+  for (const Writes writes :
+       std::vector<Writes>{[](double x, double y, double w, double) -> Point2D {
+                             return {w - x, y};
+                           },
+                           [](double x, double y, double, double h) -> Point2D {
+                             return {x, h - y};
+                           },
+                           [](double x, double y, double, double) -> Point2D {
+                             return {y, x};
+                           },
+                           [](double x, double y, double w, double) -> Point2D {
+                             return {y, w - x};
+                           },
+                           [](double x, double y, double, double h) -> Point2D {
+                             return {h - y, x};
+                           }}) {
+    for (const bool writes_opengl : {false, true}) {
+      Model written = writes_opengl ? WrittenBy(Programs()[4], model) : model;
+      for (Image& image : written.images) {
+        for (Point2D& point : image.points2D) {
+          const Point2D pixel = writes(point.x, point.y, width, height);
+          point.x = pixel.x;
+          point.y = pixel.y;
+        }
+      }
+      const auto found = FindConventions(written);
+      ASSERT_TRUE(found);
+      EXPECT_FALSE(found->pixel_from_file_axes.isIdentity());
+      EXPECT_EQ(found->poses.NumDifferences() > 0, writes_opengl);
+      const std::vector<double> after =
+          PixelErrors(ConvertModel(written, *found));
+      for (size_t e = 0; e < before.size(); ++e) {
+        EXPECT_NEAR(after[e], before[e], 1e-6) << e;
+      }
+    }
+  }
+}
+
 TEST(FindConventions, FindsHowPosesOfPanoramasAreWritten) {
   SceneOptions options = SceneOf(12, 200, 4, 0.5, 1);
   options.camera_model_id = 17;  // EQUIRECTANGULAR

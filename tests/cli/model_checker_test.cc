@@ -89,6 +89,7 @@ TEST_F(ModelCheckerCommand, ConvertsAModelThatIsNotInColmapsConventions) {
   const Json report = ReadJson(folder_ / "r.json");
   EXPECT_TRUE(report["is_anything_wrong"]);
   EXPECT_EQ(report["conventions"]["camera_axes"], "x right, y up, z backward");
+  EXPECT_EQ(report["conventions"]["pixel_axes"], "x right, y down");
   const PixelErrorStatistics errors =
       Summarize(PixelErrors(Load(folder_ / "cured")));
   const double sound = Summarize(PixelErrors(Load(folder_ / "sound"))).max;

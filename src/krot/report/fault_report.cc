@@ -141,19 +141,27 @@ std::string CamerasSentence(const ModelCheck& check) {
 namespace {
 
 // For example "x right, y down, z forward".
-std::string AxesWords(const PoseConventions& conventions) {
+std::string AxesWords(const Eigen::MatrixXd& axes) {
   constexpr const char* kDirections[] = {"left", "right",    "up",
                                          "down", "backward", "forward"};
-  Eigen::Matrix3d axes = conventions.cam_from_file_axes;
-  if (conventions.is_left_handed) axes.col(1) = -axes.col(1);
   std::vector<std::string> words;
-  for (int j = 0; j < 3; ++j) {
+  for (int j = 0; j < axes.cols(); ++j) {
     Eigen::Index i = 0;
     axes.col(j).cwiseAbs().maxCoeff(&i);
     words.push_back(std::string(1, "xyz"[j]) + " " +
                     kDirections[2 * i + (axes(i, j) > 0 ? 1 : 0)]);
   }
   return ListText(words);
+}
+
+std::string CameraAxesWords(const PoseConventions& conventions) {
+  Eigen::Matrix3d axes = conventions.cam_from_file_axes;
+  if (conventions.is_left_handed) axes.col(1) = -axes.col(1);
+  return AxesWords(axes);
+}
+
+std::string PixelAxesWords(const Conventions& conventions) {
+  return AxesWords(conventions.pixel_from_file_axes);
 }
 
 // For example "poses from camera to world".
@@ -169,7 +177,7 @@ std::vector<std::string> PoseWords(const PoseConventions& one,
   }
   if (one.is_left_handed || !one.cam_from_file_axes.isIdentity()) {
     words.push_back(std::string(one.is_left_handed ? "left-handed " : "") +
-                    "camera axes (" + AxesWords(one) + ")");
+                    "camera axes (" + CameraAxesWords(one) + ")");
   }
   return words;
 }
@@ -196,6 +204,9 @@ std::string ConventionWords(const Conventions& one) {
   if (one.has_central_principal_point) {
     words.push_back("principal points far from the middle of the photos");
   }
+  if (!one.pixel_from_file_axes.isIdentity()) {
+    words.push_back("2D points with other axes (" + PixelAxesWords(one) + ")");
+  }
   if (one.has_wrong_points) {
     words.push_back("3D points that are not where the images see them");
   }
@@ -205,7 +216,7 @@ std::string ConventionWords(const Conventions& one) {
 Json PoseJson(const PoseConventions& one) {
   Json json = KROT_JSON_OF(one, has_w_last, is_world_from_cam, has_centers,
                            is_left_handed);
-  json["camera_axes"] = AxesWords(one);
+  json["camera_axes"] = CameraAxesWords(one);
   return json;
 }
 
@@ -227,6 +238,7 @@ nlohmann::ordered_json ConventionsJson(const Conventions& one) {
   Json json = {{"words", ConventionWords(one)}};
   json.update(PoseJson(one.poses));
   json["sensors"] = PoseJson(one.sensors);
+  json["pixel_axes"] = PixelAxesWords(one);
   json.update(KROT_JSON_OF(one, rig_factor, intrinsics_factor,
                            has_central_principal_point, has_wrong_points,
                            median_error_as_read_px, median_error_px));
