@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "krot/base/context.h"
 #include "krot/conic/interior_point.h"
@@ -119,5 +120,30 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
 void MinimizeRobustly(const KnownRotationProblem& problem,
                       const Context& context, Estimate* estimate,
                       double tolerance = 3e-4);
+
+// The softest motion of a problem: of all that change depths, the one that
+// changes errors least. With dr_i and dw_i / w_i the changes of an error and of
+// a relative depth as frames and points move, it minimises
+//
+//   sum |dr_i|^2 / sum (dw_i / w_i)^2 .
+//
+// Parts whose relative scale nothing ties grow and shrink at no cost. A common
+// scale, which changes all depths alike, is left out where it is free.
+// Depths count only in tracks that tell them to a tenth, and in frames with
+// three of these: other tracks would give the softest motion, each its own.
+struct SoftestMotion {
+  // dw / w of the median point that a frame sees; all are at most about one.
+  // None where no depth counts.
+  std::vector<std::optional<double>> changes;
+  // The standard deviation of that motion, in which `changes` are one; infinite
+  // if nothing opposes it.
+  double deviation = 0;
+};
+
+// At an estimate, to first order, for noise of `sigma` pixels per axis. Nothing
+// may be fixed. Takes a factor of the reduced camera system.
+SoftestMotion FindSoftestMotion(const KnownRotationProblem& problem,
+                                const Estimate& estimate, double sigma,
+                                const Context& context);
 
 }  // namespace krot::internal

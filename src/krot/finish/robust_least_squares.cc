@@ -152,12 +152,151 @@ class RobustLeastSquares {
   BlockVector step_;
 };
 
+// Inverse iteration of what FindSoftestMotion minimises.
+class SoftestMotionSearch {
+ public:
+  SoftestMotionSearch(const KnownRotationProblem& problem,
+                      const Estimate& estimate, double sigma,
+                      const Context& context)
+      : problem_(problem),
+        sigma_(sigma),
+        count_(static_cast<int64_t>(problem.observations.size())),
+        structure_(AnchoredStructure(problem)),
+        least_squares_(structure_, context),
+        by_depth_(problem.observations.size(), Eigen::Vector3d::Zero()),
+        changes_(problem.observations.size(), 0) {
+    Linearize(estimate);
+    ChooseTelling();
+  }
+
+  SoftestMotion Run() {
+    SoftestMotion softest;
+    softest.changes.resize(problem_.num_frames);
+    for (int64_t i = 0; i < count_; ++i) {
+      Rows rows(least_squares_.rows(i));
+      if (is_telling_[i]) {
+        rows.row(2) = kDepthWeight * sigma_ * by_depth_[i].transpose();
+        changes_[i] = std::sin(problem_.FrameOf(i) + 1);
+      }
+    }
+    if (!least_squares_.Factorize()) return softest;
+    std::vector<double> image(3 * count_);
+    BlockVector motion;
+    for (int n = 0; n < 10; ++n) {
+      TakeOutScale();
+      std::fill(image.begin(), image.end(), 0);
+      for (int64_t i = 0; i < count_; ++i) image[3 * i + 2] = changes_[i];
+      least_squares_.Solve(nullptr, image.data(), SchurComplement::kTolerance,
+                           &motion, image.data());
+      double most = 0;
+      for (int64_t i = 0; i < count_; ++i) {
+        changes_[i] = image[3 * i + 2] / (kDepthWeight * sigma_);
+        most = std::max(most, std::abs(changes_[i]));
+      }
+      if (!(most > 0 && std::isfinite(most))) return softest;
+      for (double& change : changes_) change /= most;
+      for (double& number : image) number /= most;
+    }
+    double sum = 0;
+    for (int64_t i = 0; i < count_; ++i) {
+      sum += Eigen::Map<Eigen::Vector2d>(&image[3 * i]).squaredNorm();
+    }
+    for (int32_t f = 0; f < problem_.num_frames; ++f) {
+      std::vector<double> changes;
+      for (const int32_t i : problem_.OfFrame(f)) {
+        if (is_telling_[i]) changes.push_back(changes_[i]);
+      }
+      if (!changes.empty()) softest.changes[f] = Median(std::move(changes));
+    }
+    softest.deviation = sigma_ / std::sqrt(sum);
+    return softest;
+  }
+
+ private:
+  using Rows = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
+  // A relative depth counts as little as so many standard deviations.
+  static constexpr double kDepthWeight = 1e-3;
+  static constexpr double kTellingDepth = 0.1;
+  static constexpr size_t kTellingTracks = 3;
+
+  // The changes dr of errors, and of relative depths, by s - C.
+  void Linearize(const Estimate& estimate) {
+    for (int64_t i = 0; i < count_; ++i) {
+      const Observation& o = problem_.observations[i];
+      const ViewedPoint viewed = ViewPoint(problem_, o, estimate);
+      Rows rows(least_squares_.rows(i));
+      rows.setZero();
+      if (!std::isfinite(ResidualOf(viewed, Norm::L2()))) continue;
+      const Eigen::Matrix3d by_point =
+          problem_.views[o.view].cam_from_world_rotation / viewed.depth;
+      by_depth_[i] = (o.E.row(0) * by_point).transpose();
+      rows.topRows<2>() =
+          (o.E.bottomRows<2>() - viewed.v / viewed.depth * o.E.row(0)) *
+          by_point;
+    }
+  }
+
+  // Marks the observations whose relative depth is known to a tenth where
+  // frames stand still.
+  void ChooseTelling() {
+    is_telling_.assign(count_, 0);
+    for (int32_t k = 0; k < problem_.num_points; ++k) {
+      std::vector<double> rows;
+      for (const int64_t i : problem_.OfPoint(k)) {
+        rows.insert(rows.end(), least_squares_.rows(i),
+                    least_squares_.rows(i) + 6);
+      }
+      const UpperTriangle R =
+          Orthogonalize(static_cast<int64_t>(rows.size()) / 3, rows.data());
+      if (std::isinf(R.r00) || std::isinf(R.r11) || std::isinf(R.r22)) continue;
+      for (const int64_t i : problem_.OfPoint(k)) {
+        is_telling_[i] =
+            by_depth_[i] != Eigen::Vector3d::Zero() &&
+            sigma_ * R.SolveTransposed(by_depth_[i]).norm() < kTellingDepth;
+      }
+    }
+    for (int32_t f = 0; f < problem_.num_frames; ++f) {
+      size_t num_telling = 0;
+      for (const int32_t i : problem_.OfFrame(f)) num_telling += is_telling_[i];
+      if (num_telling >= kTellingTracks) continue;
+      for (const int32_t i : problem_.OfFrame(f)) is_telling_[i] = 0;
+    }
+  }
+
+  void TakeOutScale() {
+    if (HasBaseline(problem_)) return;
+    double sum = 0, count = 0;
+    for (int64_t i = 0; i < count_; ++i) {
+      sum += changes_[i];
+      count += is_telling_[i];
+    }
+    for (int64_t i = 0; i < count_; ++i) {
+      if (is_telling_[i]) changes_[i] -= sum / count;
+    }
+  }
+
+  const KnownRotationProblem& problem_;
+  const double sigma_;   // pixels
+  const int64_t count_;  // of observations
+  const BlockStructure structure_;
+  CentredLeastSquares<3> least_squares_;
+  std::vector<Eigen::Vector3d> by_depth_;  // dw / w by s - C
+  std::vector<double> changes_;            // dw / w
+  std::vector<char> is_telling_;
+};
+
 }  // namespace
 
 void MinimizeRobustly(const KnownRotationProblem& problem,
                       const Context& context, Estimate* estimate,
                       double tolerance) {
   RobustLeastSquares(problem, tolerance, context, estimate).Run();
+}
+
+SoftestMotion FindSoftestMotion(const KnownRotationProblem& problem,
+                                const Estimate& estimate, double sigma,
+                                const Context& context) {
+  return SoftestMotionSearch(problem, estimate, sigma, context).Run();
 }
 
 }  // namespace krot::internal

@@ -1,10 +1,13 @@
 #include "krot/outliers/parts.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 #include <utility>
 
+#include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
+#include "krot/finish/least_squares.h"
 #include "krot/problem/subset.h"
 
 namespace krot::internal {
@@ -244,6 +247,77 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
   }
   NumberInOrder(&part_of);
   return part_of;
+}
+
+namespace {
+
+// The noise per axis, pixels, from the median error.
+double NoiseOfAll(const KnownRotationProblem& problem,
+                  const Estimate& estimate) {
+  std::vector<double> errors;
+  for (const Observation& o : problem.observations) {
+    const auto rows =
+        2.0 * static_cast<double>(problem.point_begin[o.point + 1] -
+                                  problem.point_begin[o.point]);
+    if (rows <= 3) continue;
+    errors.push_back(ResidualOf(ViewPoint(problem, o, estimate), Norm::L2()) *
+                     std::sqrt(rows / (rows - 3)));
+  }
+  if (errors.empty()) return kLeastNoisePx;
+  return std::max(kLeastNoisePx,
+                  Median(std::move(errors)) / std::sqrt(2 * std::log(2.0)));
+}
+
+}  // namespace
+
+std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
+                                     const Estimate& estimate,
+                                     const std::vector<char>& kept,
+                                     const Context& context) {
+  const ProblemSubset subset(
+      problem, IndicesWhere(static_cast<int64_t>(kept.size()),
+                            [&](int64_t i) { return kept[i] != 0; }));
+  const KnownRotationProblem& own = subset.problem();
+  if (own.observations.empty()) return std::nullopt;
+  const Estimate placed = subset.Restrict(estimate);
+  const auto [changes, deviation] =
+      FindSoftestMotion(own, placed, NoiseOfAll(own, placed), context);
+  double least = kInfinity, most = -kInfinity;
+  for (const std::optional<double>& change : changes) {
+    least = std::min(least, change.value_or(least));
+    most = std::max(most, change.value_or(most));
+  }
+  if (!(most > least)) return std::nullopt;
+  WeakLink link;
+  link.scale_factor = 1 + 3 * deviation * (most - least);
+  if (link.scale_factor > kLargestScale) link.scale_factor = kInfinity;
+  // The side with fewer frames.
+  std::vector<int32_t> own_frame(problem.num_frames, -1);
+  for (size_t i = 0; i < own.observations.size(); ++i) {
+    const auto n = static_cast<int64_t>(i);
+    own_frame[problem.FrameOf(subset.InWhole(n))] = own.FrameOf(n);
+  }
+  std::vector<int32_t> sides[2];
+  std::vector<char> side_of(problem.num_frames, 2);
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    if (own_frame[f] < 0 || !changes[own_frame[f]]) continue;
+    const int side = 2 * *changes[own_frame[f]] > least + most ? 1 : 0;
+    side_of[f] = static_cast<char>(side);
+    sides[side].push_back(f);
+  }
+  link.frames = sides[sides[1].size() <= sides[0].size()];
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    bool sees[3] = {}, agrees[3] = {};
+    for (const int64_t i : problem.OfPoint(k)) {
+      const int side = side_of[problem.FrameOf(i)];
+      sees[side] = true;
+      agrees[side] = agrees[side] || kept[i];
+    }
+    link.num_tracks += sees[0] && sees[1];
+    link.num_agreeing += agrees[0] && agrees[1];
+  }
+  link.num_telling = link.num_tracks;
+  return link;
 }
 
 }  // namespace krot::internal

@@ -248,12 +248,14 @@ struct WeakLink {
 
   // Whether scale and place can be relied on: the scale is held to a tenth, and
   // more tracks agree than disagree; or no turn was found, and as large a share
-  // agrees as elsewhere.
+  // agrees as elsewhere. As any two tracks agree at some place and scale, fewer
+  // than six are no such share.
   bool IsHeld() const {
     const double share = static_cast<double>(num_agreeing) /
                          static_cast<double>(std::max<int64_t>(1, num_telling));
     return scale_factor <= 1.1 &&
-           (share > 0.5 || (turn_deg == 0 && share > usual_share));
+           (share > 0.5 ||
+            (turn_deg == 0 && share > usual_share && num_agreeing >= 6));
   }
 };
 
@@ -269,6 +271,18 @@ void JoinParts(const KnownRotationProblem& problem,
                const std::vector<int32_t>& parts,
                const std::vector<int32_t>& point_part, double cap,
                const Context& context, Estimate* estimate);
+
+// Scales are tried and told up to this factor.
+inline constexpr double kLargestScale = 30;
+
+// The part of a problem, in as many components as what is kept leaves, that
+// could grow or shrink most at a small rise of the errors of the `kept`
+// observations (marked), at the estimate as it stands. To first order:
+// scale_factor is 1 + 3 standard deviations. None if nothing can.
+std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
+                                     const Estimate& estimate,
+                                     const std::vector<char>& kept,
+                                     const Context& context);
 
 // The links between the parts of an estimate, of which only the translations
 // are used: how much could the scales differ from the estimate's?

@@ -19,9 +19,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-// The scales that are tried, up to this factor from the ratio of the median
-// depths, and the ratio of neighbours on the grid.
-constexpr double kLargestScale = 30;
+// The ratio of neighbours on the grid of scales.
 constexpr double kScaleStep = 1.05;
 // Observations agree with a point up to so many standard deviations.
 constexpr double kAgreeing = 4;
@@ -349,6 +347,7 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
                                     const std::vector<char>& kept, double cap,
                                     const Context& context) {
   std::vector<WeakLink> links;
+  std::vector<WeakLink> others;  // than the component with most frames
   for (std::vector<int64_t>& component : SplitIntoComponents(problem)) {
     std::vector<int32_t> frames;  // of the component, as the subset has them
     for (const int64_t i : component) frames.push_back(problem.FrameOf(i));
@@ -360,7 +359,6 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
       own_kept[i] = kept[subset.InWhole(static_cast<int64_t>(i))];
     }
     std::vector<int32_t> parts = FindParts(own, own_kept, {});
-    if (NumParts(parts) == 1) continue;
     Estimate placed = subset.Restrict(estimate);
     PlacePointsRobustly(own, AllPoints(own), Norm::L2(), cap, context, &placed);
     if (!HasBaseline(own)) NormalizeScale(own, &placed);
@@ -368,12 +366,29 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
     for (int32_t k = 0; k < own.num_points; ++k) {
       point_part[k] = parts[own.FrameOf(own.point_begin[k])];
     }
-    for (WeakLink& link : Joiner(own, std::move(parts), std::move(point_part),
-                                 cap, /*may_move=*/false, context, &placed)
-                              .Run()) {
+    std::vector<WeakLink> own_links =
+        Joiner(own, std::move(parts), std::move(point_part), cap,
+               /*may_move=*/false, context, &placed)
+            .Run();
+    if (std::all_of(own_links.begin(), own_links.end(),
+                    [](const WeakLink& link) { return link.IsHeld(); })) {
+      std::optional<WeakLink> soft =
+          FindSoftPart(own, placed, own_kept, context);
+      if (soft && !soft->IsHeld()) own_links.push_back(*std::move(soft));
+    }
+    for (WeakLink& link : own_links) {
       for (int32_t& f : link.frames) f = subset.IsWhole() ? f : frames[f];
       links.push_back(std::move(link));
     }
+    WeakLink& whole = others.emplace_back();
+    whole.frames = std::move(frames);
+    whole.scale_factor = kInfinity;
+  }
+  // Components are not tied to the largest of them at all.
+  SortLargestFirst(&others,
+                   [](const WeakLink& link) { return link.frames.size(); });
+  for (size_t n = 1; n < others.size(); ++n) {
+    links.push_back(std::move(others[n]));
   }
   return links;
 }

@@ -20,9 +20,15 @@ std::string WeakPartWords(const WeakPart& part) {
   const auto count = static_cast<int64_t>(part.image_names.size());
   const auto [first, last] =
       std::minmax_element(part.image_names.begin(), part.image_names.end());
-  return Counted(count, "image") + " (" + *first +
-         TextIf(count > 1, (count == 2 ? " and " : " to ") + *last) + ") " +
-         (count == 1 ? "hangs" : "hang") + " on the rest by " +
+  const std::string images =
+      Counted(count, "image") + " (" + *first +
+      TextIf(count > 1, (count == 2 ? " and " : " to ") + *last) + ") ";
+  if (part.num_tracks == 0) {
+    return images + (count == 1 ? "shares" : "share") +
+           " no track with the rest: nothing tells their place and scale "
+           "against it";
+  }
+  return images + (count == 1 ? "hangs" : "hang") + " on the rest by " +
          Counted(part.num_tracks, "track") + ", of which " +
          std::to_string(part.num_agreeing) +
          (part.num_agreeing == 1 ? " agrees" : " agree") + "; their " +
@@ -94,7 +100,9 @@ std::string UnreliableSentence(const OutlierFilterSummary& summary) {
     add("hardly anything fits: half of all errors are so large that noise "
         "would explain " +
         Pixels(summary.max_error) +
-        "; look at rotations, intrinsics and matches");
+        (parts.empty() ? "; look"
+                       : "; if that is so of each part alone, look") +
+        " at rotations, intrinsics and matches");
   } else if (2 * num_removed > summary.num_observations) {
     add(Thousands(num_removed) + " of " + Thousands(summary.num_observations) +
         " observations, more than half, are not within " +
