@@ -122,6 +122,29 @@ TEST(WeaklyTiedTracks, AreSaidNotToHoldTheScaleOfAPart) {
   EXPECT_EQ(parts[0]["is_held"], false);
 }
 
+TEST(TracksInTwoComponents, AreNotToBeReliedOn) {
+  const TempFolder folder;
+  SceneOptions options = SmallScene();
+  options.layout = SceneLayout::kStreet;
+  options.num_frames = 24;
+  options.num_points = 1500;
+  Save(WeaklyTied(
+           WithoutTranslations(SynthesizeScene(options).model),
+           [](int n) { return n / 14; }, [](int, int) { return false; },
+           /*num_tracks=*/0, /*num_wrong=*/0),
+       folder / "input");
+  const KrotResult result =
+      RunKrot({"solver", "--input_path", folder / "input", "--output_path",
+               folder / "output", "--report_path", folder / "r.json",
+               "--Solver.init", "feasible"});
+  EXPECT_EQ(result.exit_code, 10) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("share no track with the rest"));
+  const Json parts = ReadJson(folder / "r.json")["outliers"]["weak_parts"];
+  ASSERT_EQ(parts.size(), 1u);
+  EXPECT_EQ(parts[0]["num_tracks"], 0);
+  EXPECT_TRUE(parts[0]["scale_factor"].is_null());
+}
+
 TEST(WrongRotations, AreNamedByTheirImages) {
   const TempFolder folder;
   SceneOptions options = SmallScene();

@@ -484,6 +484,89 @@ TEST(FilterOutliers, SaysHowWellFewTracksHoldTheScale) {
   EXPECT_FALSE(scale_factors(1, 0).is_held);
 }
 
+// Two sides of a path that share no track, but both the camera in between, of
+// which any scale fits.
+Model Hinged(const SceneOptions& options) {
+  const Model model = SynthesizeScene(options).model;
+  const ImageId hinge = model.images[options.num_frames / 2].id;
+  std::vector<char> is_removed(model.track_elements.size(), 0);
+  for (const Point3D& point : model.points3D) {
+    int num_before = 0, num_after = 0;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      num_before += model.track_elements[e].image_id < hinge;
+      num_after += model.track_elements[e].image_id > hinge;
+    }
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const ImageId id = model.track_elements[e].image_id;
+      is_removed[e] = num_before > num_after ? id > hinge : id < hinge;
+    }
+  }
+  return RemoveObservations(model, is_removed).model;
+}
+
+TEST(FilterOutliers, SaysThatNoTrackHoldsTheScaleAcrossAHinge) {
+  for (const int num_frames : {3, 5, 7, 25}) {
+    SceneOptions options = SceneInParts(SceneLayout::kStreet);
+    options.num_frames = num_frames;
+    options.track_length = std::min(options.track_length, 1.0 * num_frames);
+    OutlierFilterOptions filter;
+    filter.find_conflicts = false;
+    const auto parts_not_held = [&](const Model& model) {
+      int count = 0;
+      for (const WeakPart& part :
+           FilterOutliers(Wiped(model), filter, {}).summary.weak_parts) {
+        count += !part.is_held && !part.is_frame;
+      }
+      return count;
+    };
+    EXPECT_EQ(parts_not_held(SynthesizeScene(options).model), 0) << num_frames;
+    EXPECT_EQ(parts_not_held(Hinged(options)), 1) << num_frames;
+  }
+}
+
+TEST(FindSoftPart, IsTheSmallerSideOfAHinge) {
+  SceneOptions options = SceneInParts(SceneLayout::kStreet);
+  options.num_frames = 8;
+  const BuiltProblem whole = BuildProblem(SynthesizeScene(options).model, {});
+  const auto soft_part = [](const BuiltProblem& built) {
+    const std::vector<char> kept(built.problem.observations.size(), 1);
+    return FindSoftPart(built.problem, built.start, kept, 8, {}).value();
+  };
+  EXPECT_LT(soft_part(whole).scale_factor, 1.05);
+  const WeakLink link = soft_part(BuildProblem(Hinged(options), {}));
+  EXPECT_EQ(link.frames, (std::vector<int32_t>{5, 6, 7}));
+  EXPECT_EQ(link.scale_factor, kInfinity);
+  EXPECT_FALSE(link.IsHeld());
+}
+
+TEST(FilterOutliers, TakesOtherComponentsForPartsThatNothingHolds) {
+  const Model model = WeaklyTied(
+      SynthesizeScene(SceneInParts(kTwoParts.layout)).model,
+      [](int n) { return n / 14; }, [](int, int) { return false; },
+      /*num_tracks=*/0, /*num_wrong=*/0);
+  OutlierFilterOptions options;
+  options.find_conflicts = false;
+  const OutlierFilterResult result = FilterOutliers(Wiped(model), options, {});
+  ASSERT_EQ(result.summary.weak_parts.size(), 1u);
+  const WeakPart& part = result.summary.weak_parts[0];
+  EXPECT_EQ(part.image_names.size(), 10u);
+  EXPECT_EQ(part.num_tracks, 0);
+  EXPECT_EQ(part.scale_factor, kInfinity);
+  EXPECT_FALSE(part.is_held);
+}
+
+TEST(WeakLink, IsNotHeldByTracksThatMayAgreeByChance) {
+  WeakLink link;
+  link.usual_share = 0.1;
+  link.num_telling = 18;
+  link.num_agreeing = 5;
+  EXPECT_FALSE(link.IsHeld());
+  link.num_agreeing = 6;
+  EXPECT_TRUE(link.IsHeld());
+  link.turn_deg = 10;
+  EXPECT_FALSE(link.IsHeld());
+}
+
 TEST(FilterOutliers, NamesTheFramesThatKeepFewOfTheirObservations) {
   for (const std::set<int>& turned : {std::set<int>{}, {4}, {2, 11, 19}}) {
     Model model =

@@ -411,6 +411,20 @@ TEST(UnreliableSentence, NamesTheThreeLargestOfManyParts) {
   EXPECT_THAT(words, HasSubstr("2 smaller parts are not held either"));
 }
 
+TEST(UnreliableSentence, SaysWhichImagesAreAComponentOfTheirOwn) {
+  OutlierFilterSummary summary;
+  summary.init = SolveInit::kFeasible;
+  summary.is_bound_beyond_reason = true;
+  EXPECT_THAT(UnreliableSentence(summary), HasSubstr("px; look at rotations"));
+  WeakPart& part = summary.weak_parts.emplace_back();
+  part.image_names = {"b.jpg", "a.jpg"};
+  part.is_held = false;
+  EXPECT_THAT(UnreliableSentence(summary),
+              AllOf(HasSubstr("2 images (a.jpg and b.jpg) share no track with "
+                              "the rest: nothing tells their place"),
+                    HasSubstr("; if that is so of each part alone, look at")));
+}
+
 TEST(NormName, IsWhatTheOptionTakes) {
   EXPECT_EQ(NormName(Norm::L1()), "1");
   EXPECT_EQ(NormName(Norm::L2()), "2");

@@ -121,7 +121,6 @@ class OutlierFilter : private Filtering {
     }
     if (start.init == SolveInit::kFeasible && !context_.IsCancelled()) {
       FindWeakParts(built);
-      FindLooseFrames(built);
     }
   }
 
@@ -280,17 +279,14 @@ class OutlierFilter : private Filtering {
   }
 
   // Looks for weakly tied parts in the solved model, by all tracks of the
-  // input.
+  // input, for loose frames and, if all is held so far, for what moves softly.
   void FindWeakParts(const BuiltProblem& built) {
     Estimate estimate = built.start;
     for (size_t f = 0; f < built.frame_of.size(); ++f) {
       estimate.translations[f] =
           kept_.model.frames[built.frame_of[f]].rig_from_world.translation;
     }
-    for (const WeakLink& link :
-         FindWeakLinks(built.problem, estimate, AreKept(built),
-                       kCapOfPoints * std::min(bound_.max_error, kLevelOfStart),
-                       context_)) {
+    const auto add = [&](const WeakLink& link) {
       WeakPart& part = AddWeakPart(built, link.frames);
       part.num_tracks = link.num_tracks;
       part.num_agreeing = link.num_agreeing;
@@ -298,7 +294,20 @@ class OutlierFilter : private Filtering {
       part.is_held = link.IsHeld();
       part.turn_deg = link.turn_deg;
       part.num_agreeing_turned = link.num_agreeing_turned;
+    };
+    const double cap = kCapOfPoints * std::min(bound_.max_error, kLevelOfStart);
+    const std::vector<char> kept = AreKept(built);
+    for (const WeakLink& link :
+         FindWeakLinks(built.problem, estimate, kept, cap, context_)) {
+      add(link);
     }
+    FindLooseFrames(built);
+    for (const WeakPart& part : summary_.weak_parts) {
+      if (!part.is_held) return;
+    }
+    const std::optional<WeakLink> soft =
+        FindSoftPart(built.problem, estimate, kept, cap, context_);
+    if (soft && !soft->IsHeld()) add(*soft);
   }
 
   // Adds single frames that keep less than half of the usual share of their

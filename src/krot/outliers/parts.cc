@@ -8,6 +8,7 @@
 #include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
 #include "krot/finish/least_squares.h"
+#include "krot/outliers/robust_start.h"
 #include "krot/problem/subset.h"
 
 namespace krot::internal {
@@ -272,14 +273,15 @@ double NoiseOfAll(const KnownRotationProblem& problem,
 
 std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
                                      const Estimate& estimate,
-                                     const std::vector<char>& kept,
+                                     const std::vector<char>& kept, double cap,
                                      const Context& context) {
   const ProblemSubset subset(
       problem, IndicesWhere(static_cast<int64_t>(kept.size()),
                             [&](int64_t i) { return kept[i] != 0; }));
   const KnownRotationProblem& own = subset.problem();
   if (own.observations.empty()) return std::nullopt;
-  const Estimate placed = subset.Restrict(estimate);
+  Estimate placed = subset.Restrict(estimate);
+  PlacePointsRobustly(own, AllPoints(own), Norm::L2(), cap, context, &placed);
   const auto [changes, deviation] =
       FindSoftestMotion(own, placed, NoiseOfAll(own, placed), context);
   double least = kInfinity, most = -kInfinity;
@@ -316,7 +318,7 @@ std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
     link.num_tracks += sees[0] && sees[1];
     link.num_agreeing += agrees[0] && agrees[1];
   }
-  link.num_telling = link.num_tracks;
+  link.num_telling = link.num_agreeing;  // the others are not kept
   return link;
 }
 

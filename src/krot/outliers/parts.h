@@ -275,13 +275,14 @@ void JoinParts(const KnownRotationProblem& problem,
 // Scales are tried and told up to this factor.
 inline constexpr double kLargestScale = 30;
 
-// The part of a problem, in as many components as what is kept leaves, that
-// could grow or shrink most at a small rise of the errors of the `kept`
-// observations (marked), at the estimate as it stands. To first order:
-// scale_factor is 1 + 3 standard deviations. None if nothing can.
+// The part of a problem that could grow or shrink most at a small rise of the
+// errors of the `kept` observations (marked), which alone count: hinges are
+// found. To first order: scale_factor is 1 + 3
+// standard deviations. Of the estimate only the translations are used. Points
+// are placed as FindWeakLinks does. None if nothing can grow.
 std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
                                      const Estimate& estimate,
-                                     const std::vector<char>& kept,
+                                     const std::vector<char>& kept, double cap,
                                      const Context& context);
 
 // The links between the parts of an estimate, of which only the translations
@@ -290,8 +291,9 @@ std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
 // whose cost is above the lowest by at most three standard deviations of the
 // noise may be right, too: WeakLink::scale_factor.
 // Parts are those that the `kept` observations (marked) tie; all judge links.
-// For every connected component; none where no part hangs on few tracks. Points
-// are placed anew, and no error counts for more than `cap`, pixels.
+// For every connected component; none where no part hangs on few tracks. All
+// components but the largest come last, with no tracks. Points are placed anew,
+// and no error counts for more than `cap`, pixels.
 std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
                                     const Estimate& estimate,
                                     const std::vector<char>& kept, double cap,

@@ -358,7 +358,11 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
     for (size_t i = 0; i < own_kept.size(); ++i) {
       own_kept[i] = kept[subset.InWhole(static_cast<int64_t>(i))];
     }
+    WeakLink& whole = others.emplace_back();
+    whole.frames = frames;
+    whole.scale_factor = kInfinity;
     std::vector<int32_t> parts = FindParts(own, own_kept, {});
+    if (NumParts(parts) == 1) continue;
     Estimate placed = subset.Restrict(estimate);
     PlacePointsRobustly(own, AllPoints(own), Norm::L2(), cap, context, &placed);
     if (!HasBaseline(own)) NormalizeScale(own, &placed);
@@ -366,23 +370,12 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
     for (int32_t k = 0; k < own.num_points; ++k) {
       point_part[k] = parts[own.FrameOf(own.point_begin[k])];
     }
-    std::vector<WeakLink> own_links =
-        Joiner(own, std::move(parts), std::move(point_part), cap,
-               /*may_move=*/false, context, &placed)
-            .Run();
-    if (std::all_of(own_links.begin(), own_links.end(),
-                    [](const WeakLink& link) { return link.IsHeld(); })) {
-      std::optional<WeakLink> soft =
-          FindSoftPart(own, placed, own_kept, context);
-      if (soft && !soft->IsHeld()) own_links.push_back(*std::move(soft));
-    }
-    for (WeakLink& link : own_links) {
+    for (WeakLink& link : Joiner(own, std::move(parts), std::move(point_part),
+                                 cap, /*may_move=*/false, context, &placed)
+                              .Run()) {
       for (int32_t& f : link.frames) f = subset.IsWhole() ? f : frames[f];
       links.push_back(std::move(link));
     }
-    WeakLink& whole = others.emplace_back();
-    whole.frames = std::move(frames);
-    whole.scale_factor = kInfinity;
   }
   // Components are not tied to the largest of them at all.
   SortLargestFirst(&others,
