@@ -47,12 +47,13 @@ struct Suspect {
   int64_t num_conflicts = 0;  // conflicts that it takes part in
 };
 
-// After a start from nothing: images that few tracks connect to the rest of the
-// model, or those of a single frame that keeps few of its observations.
+// After a start from nothing: images whose scale few tracks tie to the rest of
+// the model, or none, or a single frame that keeps few of its observations.
 struct WeakPart {
   bool is_frame = false;  // a single one, which has no scale of its own
   std::vector<std::string> image_names;  // in the order of their ids
-  // Tracks of the input that both sides see; a frame's observations.
+  // Tracks of the input that both sides see, none where the part is a component
+  // of its own; a frame's observations.
   int64_t num_tracks = 0;
   // Of these, tracks that agree on one place and scale; observations kept.
   int64_t num_agreeing = 0;
