@@ -65,7 +65,10 @@ struct BundleAdjustmentOptions {
   int min_track_length = 2;
 
   // With kCauchy, and a start whose median error is above the scale, a second
-  // solve begins with that median as its scale; the lower cost is kept.
+  // solve begins with that median as its scale; the lower cost is kept. Frames
+  // that end with twice the median frame's errors are then moved by themselves,
+  // with their points, from a wider loss; if that lowers the cost, all is
+  // solved once more.
   RobustLoss loss = RobustLoss::kTrivial;
   double loss_scale = 1;  // > 0; pixels
 
@@ -137,7 +140,8 @@ struct BundleAdjustmentSummary {
   // The scale of the loss in the first of them, where it was not loss_scale;
   // pixels.
   std::optional<double> first_loss_scale;
-  std::string linear_solver;  // "dense_schur", ...
+  int64_t num_moved_frames = 0;  // with kCauchy, by themselves
+  std::string linear_solver;     // "dense_schur", ...
 
   std::optional<double> max_error;  // the cap at the end, pixels
   // With lower_max_error: the lowest largest error that was reached. It is

@@ -14,8 +14,10 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "krot/camera/camera_model.h"
 #include "krot/compare.h"
 #include "krot/context.h"
+#include "krot/geometry/transform.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"
 #include "krot/model/rigs.h"
@@ -493,6 +495,46 @@ TEST(AdjustBundle, WithCauchysLossEndsNoHigherThanWithoutAWiderOne) {
   EXPECT_GT(Median(PixelErrors(street.model, 1)), options.loss_scale);
   EXPECT_LT(adjust(street.model).cost_final,
             1.01 * adjust(street.ground_truth).cost_final);
+}
+
+// Two of five observations of a frame are those of another pose, at which it
+// starts: there they fit, and the narrow loss hardly feels the others.
+TEST(AdjustBundle, WithCauchysLossMovesAFrameToWhereMostOfItFits) {
+  Model model = SynthesizeScene(SceneOf(12, 400, 6, 0.5, 3)).ground_truth;
+  constexpr size_t kFrame = 3;
+  const Model truth = model;
+  Pose& pose = model.frames[kFrame].rig_from_world;
+  const Eigen::AngleAxisd turn(0.1, Eigen::Vector3d(1, 2, 3).normalized());
+  const RigidTransform turned =
+      RigidTransform{turn.toRotationMatrix(), {0, 0, 0}} * pose.Transform();
+  Model true_start = model;
+  int64_t num_seen = 0;
+  for (const Point3D& point : truth.points3D) {
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = truth.track_elements[e];
+      if (element.image_id != truth.images[kFrame].id) continue;
+      if (num_seen++ % 5 >= 2) continue;
+      const Eigen::Vector2d pixel =
+          *ProjectPoint(truth.cameras[0], turned * point.xyz);
+      Point2D& seen = true_start.images[kFrame].points2D[element.point2D_idx];
+      seen.x = pixel.x();
+      seen.y = pixel.y();
+    }
+  }
+  model.images = true_start.images;
+  pose = ToPose(turned);
+  FollowFrames(&model);
+  BundleAdjustmentOptions options;
+  options.loss = RobustLoss::kCauchy;
+  const BundleAdjustmentSummary expected =
+      AdjustBundle(true_start, options, kAdjustAlone).summary;
+  const BundleAdjustmentSummary summary =
+      AdjustBundle(model, options, kAdjustAlone).summary;
+  EXPECT_EQ(expected.num_moved_frames, 0);
+  EXPECT_EQ(summary.num_moved_frames, 1);
+  // Some points stay near what the wrong pose saw.
+  EXPECT_LT(summary.cost_final, 1.02 * expected.cost_final);
+  EXPECT_EQ(summary.iterations.size(), summary.num_iterations);
 }
 
 TEST(AdjustBundle, FindsExactModelsOfEveryCamera) {

@@ -194,8 +194,9 @@ void MinimizeFromWiderLoss(const BundleAdjustmentOptions& options,
 // that is far off is hardly drawn, and stays; from a wider loss it comes, but
 // then wrong observations may draw others away. So both are tried, and the
 // lower cost is kept.
-void Minimize(const BundleAdjustmentOptions& options, const Context& context,
-              AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary) {
+void MinimizeFromBoth(const BundleAdjustmentOptions& options,
+                      const Context& context, AdjustmentBlocks* blocks,
+                      BundleAdjustmentSummary* summary) {
   const auto minimize = [&] {
     IterationObserver observer(options.callback, context);
     MinimizeLoss(options, context, &observer, blocks, summary);
@@ -212,6 +213,102 @@ void Minimize(const BundleAdjustmentOptions& options, const Context& context,
     *blocks = std::move(wider_blocks);
     *summary = std::move(wider);
   }
+}
+
+// For each frame the error that a quarter of its observations exceed, pixels; 0
+// without observations.
+std::vector<double> UpperQuartiles(const Context& context,
+                                   const AdjustmentBlocks& blocks) {
+  const auto errors = ProjectErrors(blocks, kInfinity, context.num_threads);
+  std::vector<std::vector<double>> of_frame(blocks.frames.size());
+  for (size_t i = 0; i < errors->size(); ++i) {
+    of_frame[blocks.observations[i].frame].push_back((*errors)[i].r.norm());
+  }
+  std::vector<double> quartiles;
+  for (std::vector<double>& norms : of_frame) {
+    if (norms.empty()) {
+      quartiles.push_back(0);
+      continue;
+    }
+    const auto quartile =
+        norms.begin() + static_cast<int64_t>(3 * (norms.size() - 1) / 4);
+    std::nth_element(norms.begin(), quartile, norms.end());
+    quartiles.push_back(*quartile);
+  }
+  return quartiles;
+}
+
+// The part of the problem that a frame sees: it and its points may move.
+AdjustmentBlocks PartAround(int32_t frame, const AdjustmentBlocks& blocks) {
+  AdjustmentBlocks part = blocks;
+  part.num_images = 1;
+  part.positions.clear();
+  part.distances.clear();
+  part.frame_is_fixed.assign(part.frames.size(), 1);
+  part.frame_is_fixed[frame] = 0;
+  part.sensor_is_fixed.assign(part.sensors.size(), 1);
+  std::vector<char> is_seen(part.points.size(), 0);
+  for (const AdjustmentObservation& observation : blocks.observations) {
+    if (observation.frame == frame) is_seen[observation.point] = 1;
+  }
+  part.observations.erase(
+      std::remove_if(part.observations.begin(), part.observations.end(),
+                     [&](const AdjustmentObservation& observation) {
+                       return is_seen[observation.point] == 0;
+                     }),
+      part.observations.end());
+  return part;
+}
+
+// Moves a frame and its points from a loss of this scale to the options' own,
+// which narrows step by step. Whether the cost falls by more than
+// `least_gain`; if not, nothing moves.
+bool MoveFrame(int32_t frame, const BundleAdjustmentOptions& options,
+               double first_scale, double least_gain, const Context& context,
+               AdjustmentBlocks* blocks) {
+  AdjustmentBlocks part = PartAround(frame, *blocks);
+  BundleAdjustmentOptions stage = options;
+  stage.refine_sensor_from_rig = false;
+  stage.refine_focal_length = false;
+  stage.refine_principal_point = false;
+  stage.refine_extra_params = false;
+  const double before = *RobustCost(context, MakeLoss(options).get(), part);
+  BundleAdjustmentSummary summary;
+  for (double scale = first_scale;; scale /= 2) {
+    stage.loss_scale = std::max(scale, options.loss_scale);
+    IterationObserver observer(nullptr, context);
+    MinimizeLoss(stage, context, &observer, &part, &summary);
+    if (scale <= options.loss_scale) break;
+  }
+  if (!(summary.cost_final < before - least_gain)) return false;
+  blocks->frames[frame] = part.frames[frame];
+  blocks->points = std::move(part.points);
+  return true;
+}
+
+// The same, and with Cauchy's loss frames with twice the median frame's errors
+// are moved one by one, and then all once more.
+void Minimize(const BundleAdjustmentOptions& options, const Context& context,
+              AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary) {
+  MinimizeFromBoth(options, context, blocks, summary);
+  if (options.loss != RobustLoss::kCauchy || !options.refine_rig_from_world) {
+    return;
+  }
+  const std::vector<double> quartiles = UpperQuartiles(context, *blocks);
+  const double median = MedianOf(quartiles, context);
+  for (size_t f = 0; f < quartiles.size() && !context.IsCancelled(); ++f) {
+    if (blocks->frame_is_fixed[f] != 0 || quartiles[f] <= 2 * median) continue;
+    summary->num_moved_frames += MoveFrame(
+        static_cast<int32_t>(f), options, quartiles[f],
+        options.function_tolerance * summary->cost_final, context, blocks);
+  }
+  if (summary->num_moved_frames == 0) return;
+  const int num_before = summary->num_iterations;
+  BundleAdjustmentOptions rest = options;
+  rest.max_num_iterations -= num_before;
+  IterationObserver observer(options.callback, context);
+  MinimizeLoss(rest, context, &observer, blocks, summary);
+  summary->num_iterations += num_before;
 }
 
 // Solves a problem below a cap, which is lowered first if the options say so.

@@ -49,6 +49,11 @@ std::string AdjustmentEndSentence(const BundleAdjustmentSummary& summary) {
              Pixels(*summary.first_loss_scale, 2) +
              ", the median error of the start";
   }
+  if (summary.num_moved_frames > 0) {
+    after += ", between which " +
+             Counted(summary.num_moved_frames, "frame", "was", "were") +
+             " moved alone";
+  }
   switch (summary.termination) {
     case BundleAdjustmentTermination::kConverged:
       return "Converged" + after + ".";
@@ -216,8 +221,8 @@ std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
   json.update(
       KROT_JSON_OF(adjustment, cost_initial, cost_final, num_iterations));
   json["iterations"] = ListJson(adjustment.iterations, AdjustmentIterationJson);
-  json.update(
-      KROT_JSON_OF(adjustment, first_loss_scale, linear_solver, stationarity));
+  json.update(KROT_JSON_OF(adjustment, num_moved_frames, first_loss_scale,
+                           linear_solver, stationarity));
   json["max_error"] = summary.max_error;
   json["lowest_max_error"] = adjustment.lowest_max_error;
   json.update(KnownIf(adjustment.lowest_max_error.has_value(),
