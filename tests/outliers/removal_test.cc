@@ -89,6 +89,21 @@ TEST(FindRemoval, NeedsNothingWhereEverythingFits) {
                   .observations.empty());
 }
 
+TEST(RemoveChancePairs, TakesTheLastTwoOfTracksOfWhichMoreWent) {
+  Model model;
+  std::vector<char> is_removed;
+  for (const std::vector<char>& track : std::vector<std::vector<char>>{
+           {0, 1, 1, 0}, {0, 1, 1, 1, 0}, {0, 0, 1, 1, 1, 1, 0}, {0, 0}}) {
+    Point3D& point = model.points3D.emplace_back();
+    point.track_begin = is_removed.size();
+    is_removed.insert(is_removed.end(), track.begin(), track.end());
+    point.track_end = is_removed.size();
+  }
+  RemoveChancePairs(model, &is_removed);
+  EXPECT_EQ(is_removed, std::vector<char>({0, 1, 1, 0, 1, 1, 1, 1, 1, 0, 0, 1,
+                                           1, 1, 1, 0, 0, 0}));
+}
+
 constexpr double kLevel = 1;
 
 KnownRotationProblem MakeProblem() {

@@ -101,15 +101,14 @@ class OutlierFilter : private Filtering {
       return;
     }
     for (const int64_t i : removal->observations) is_removed_[elements[i]] = 1;
+    if (IsEnough()) RemoveChancePairs(model_, &is_removed_);
     if (options_.find_conflicts) {
       Pack(built, *removal, std::move(found), elements);
     }
     if (options_.on_removed) {
       options_.on_removed(static_cast<int64_t>(removal->observations.size()));
     }
-    Model moved;
-    PlaceAt(built, *removal, &moved);
-    Solve(std::move(moved));
+    Solve(PlacedAt(built, *removal));
     // Observations that had no part in the problem may still be above the
     // bound.
     if (RemoveAbove()) {
@@ -127,15 +126,20 @@ class OutlierFilter : private Filtering {
   // Whether all observations can be within the bound that noise has chosen. If
   // so, they are.
   bool KeepsAll(const BuiltProblem& built) {
-    Model moved;
-    PlaceAt(built, {{}, built.start}, &moved);
-    Solve(std::move(moved));
-    if (context_.IsCancelled()) return false;
-    if (!AreWithin(PixelErrors(kept_.model, context_.num_threads))) {
+    Solve(PlacedAt(built, {{}, built.start}));
+    if (context_.IsCancelled() ||
+        !AreWithin(PixelErrors(kept_.model, context_.num_threads))) {
       return false;
     }
     FindWeakParts(built);
     return true;
+  }
+
+  // Whether the removal need not be the smallest: a robust start leaves few
+  // above the bound already, and programmes would take ten times as long to
+  // find a two-hundredth fewer, and do not hold parts' scales.
+  bool IsEnough() const {
+    return summary_.init == SolveInit::kFeasible && !options_.find_conflicts;
   }
 
   void FilterByThreshold() {
@@ -162,14 +166,9 @@ class OutlierFilter : private Filtering {
       bound_.max_error = summary_.noise->limit.max_error;
     }
     const Timer timer;
-    // A robust start leaves few above the bound already: programmes would take
-    // ten times as long to find a two-hundredth fewer, and do not hold parts'
-    // scales.
-    const bool is_enough =
-        summary_.init == SolveInit::kFeasible && !options_.find_conflicts;
     Removal removal = FindRemoval(model_, built, bound_, context_,
-                                  is_enough ? 0 : kMaxProgrammes);
-    if (is_enough && !options_.max_error) bound_.max_error *= kRoomOfFinish;
+                                  IsEnough() ? 0 : kMaxProgrammes);
+    if (IsEnough() && !options_.max_error) bound_.max_error *= kRoomOfFinish;
     summary_.seconds_removal = timer.Seconds();
     return removal;
   }
@@ -230,9 +229,8 @@ class OutlierFilter : private Filtering {
     summary_.seconds_conflicts = timer.Seconds();
   }
 
-  // Moves a copy of the input to the removal's estimate, in the input's frame.
-  void PlaceAt(const BuiltProblem& built, const Removal& removal,
-               Model* moved) {
+  // A copy of the input at the removal's estimate, in the input's frame.
+  Model PlacedAt(const BuiltProblem& built, const Removal& removal) {
     Estimate placed = removal.estimate;
     const ProblemSubset part(built.problem,
                              AllBut(removal.observations, built.pixels.size()));
@@ -241,7 +239,7 @@ class OutlierFilter : private Filtering {
                            part.Restrict(OwnEstimate(model_, built)),
                            options_.solve.norm, context_, &own);
     part.Replace(own, &placed);
-    *moved = ApplyEstimate(model_, built, placed);
+    return ApplyEstimate(model_, built, placed);
   }
 
   // Solves what is left of a model that differs from the input in translations

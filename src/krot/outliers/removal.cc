@@ -351,4 +351,16 @@ TolerantSolveResult SolveTolerantly(const Model& model,
   return {std::move(solved.model), std::move(solved.summary), std::nullopt};
 }
 
+void RemoveChancePairs(const Model& model, std::vector<char>* is_removed) {
+  for (const Point3D& point : model.points3D) {
+    const auto begin =
+        is_removed->begin() + static_cast<int64_t>(point.track_begin);
+    const auto end =
+        is_removed->begin() + static_cast<int64_t>(point.track_end);
+    if (end - begin > 4 && std::count(begin, end, 0) == 2) {
+      std::fill(begin, end, 1);
+    }
+  }
+}
+
 }  // namespace krot::internal

@@ -314,4 +314,9 @@ ConflictPacking PackAgainstRemoval(
     const Removal& removal, std::vector<Conflict> found, const Context& context,
     int64_t work_per_observation = 1500);
 
+// Removes the last two observations of a track of which more went: two agree by
+// chance far more often than three do, most such pairs are wrong, and one that
+// lies near a camera can turn it.
+void RemoveChancePairs(const Model& model, std::vector<char>* is_removed);
+
 }  // namespace krot::internal
