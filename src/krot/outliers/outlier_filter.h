@@ -152,6 +152,9 @@ struct SnoopingSummary {
   // conflicts the bound of each observation is this times the square root of
   // its redundancy.
   double max_error_px = 0;
+  // Whether what is kept is at its least squares. If not, these ended higher
+  // than the input, and it stays where that has it.
+  bool is_solved = true;
   // Errors in the input of the observations that are kept.
   PixelErrorStatistics kept_error_before;
 };

@@ -45,7 +45,7 @@ Json SolveOfRestJson(const SolveSummary& solve) {
 
 Json SnoopingJson(const SnoopingSummary& snooping) {
   return Joined(KROT_JSON_OF(snooping, sigma_before_px, sigma_px, critical_w,
-                             num_tested, num_rounds, max_error_px),
+                             num_tested, num_rounds, max_error_px, is_solved),
                 {{"kept_error_before", ErrorJson(snooping.kept_error_before)}});
 }
 

@@ -151,7 +151,10 @@ std::string SnoopingSentences(const OutlierFilterSummary& summary) {
       "\nWhat was removed is more than " + noise +
       " explains;\nbefore the removal it was " +
       Pixels(*snooping.sigma_before_px, 3) +
-      ". What is left is at its least squares, rotations fixed.\n";
+      (snooping.is_solved
+           ? ". What is left is at its least squares, rotations fixed.\n"
+           : ". What is left stays where it was, as no better place was "
+             "found.\n");
   if (summary.num_proved > 0) {
     text += "That at least " + Counted(summary.num_proved, "observation") +
             " must go is proved: with these rotations, wherever cameras and\n"
