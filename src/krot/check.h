@@ -331,6 +331,10 @@ struct ModelCheck {
   // of an image's noise. If not, no image can be called misplaced, and the
   // model should be adjusted first.
   bool is_adjusted = true;
+  // Whether sigma_px is within the 4 px of COLMAP's filter or a hundredth of
+  // the photos' size. If not, cameras, 2D points and tracks are hardly those of
+  // the same images, and nothing else that is said counts.
+  bool fits = true;
   // If there are any, observations and images may look wrong only because of
   // them: the model should be adjusted with what is wrong free, and be checked
   // again. The largest gain first.
@@ -341,6 +345,9 @@ struct ModelCheck {
   std::vector<WrongObservation> observations;
   std::vector<TwoPointTrack> tracks;
   std::vector<ModelPart> parts;  // the most images first
+  // 3D points of an adjusted model that are far from where their observations,
+  // none of which is wrong, see them: in Model::points3D.
+  std::vector<int32_t> misplaced_points;
   // Pairs of images that are the same photo, as they see most of their points
   // at the same pixels: in `images`. Their observations count twice.
   std::vector<std::array<int32_t, 2>> same_photos;
@@ -349,8 +356,8 @@ struct ModelCheck {
 
   int64_t NumImages(ImageVerdict verdict) const;
   bool IsAnythingWrong() const {
-    return conventions || !observations.empty() || !cameras.empty() ||
-           NumImages(ImageVerdict::kWrong) > 0 ||
+    return conventions || !fits || !observations.empty() || !cameras.empty() ||
+           !misplaced_points.empty() || NumImages(ImageVerdict::kWrong) > 0 ||
            (pairs && pairs->IsAnythingWrong());
   }
 };

@@ -180,6 +180,15 @@ TEST(FindConventions, FindsIntrinsicsOfPhotosOfAnotherSize) {
   }
 }
 
+TEST(FindConventions, HalvesNoPrincipalPointThatIsInTheMiddle) {
+  for (const double factor : {0.5, 2.0}) {
+    Model model = SceneOfColmap(3);
+    for (Camera& camera : model.cameras) camera.params[0] *= factor;
+    const auto found = FindConventions(model);
+    EXPECT_TRUE(!found || found->intrinsics_factor == 1);
+  }
+}
+
 // Pixels that count from another corner, or rows first. Where the principal
 // point is not in the middle of the photo, no other poses fit as well.
 TEST(FindConventions, FindsHowOtherProgramsCountPixels) {

@@ -640,6 +640,49 @@ TEST(CureModel, LeavesOutWhatIsWrongAndFitsBetter) {
   }
 }
 
+// Nothing else is wrong: images and their observations are sound.
+TEST(CheckModel, FindsPointsFarFromWhereTheirImagesSeeThemAndMovesThem) {
+  const Model sound = Scene(9);
+  Model model = sound;
+  std::vector<int32_t> moved;
+  for (size_t k = 0; k < model.points3D.size(); k += 3) {
+    model.points3D[k].xyz += Eigen::Vector3d(0.3, -0.2, 0.1);
+    moved.push_back(static_cast<int32_t>(k));
+  }
+  const ModelCheck check = CheckModel(model);
+  EXPECT_EQ(check.misplaced_points, moved);
+  EXPECT_TRUE(check.IsAnythingWrong());
+  EXPECT_THAT(check.observations, IsEmpty());
+  EXPECT_THAT(CheckModel(sound).misplaced_points, IsEmpty());
+  const Model cured = CureModel(model, check).model;
+  EXPECT_EQ(cured.track_elements.size(), model.track_elements.size());
+  EXPECT_LT(Summarize(PixelErrors(cured)).rms,
+            1.01 * Summarize(PixelErrors(sound)).rms);
+}
+
+// Every observation sees another point than it says.
+TEST(CheckModel, SaysThatNothingFitsWhereTracksAreExchanged) {
+  Model model = Scene(10);
+  EXPECT_TRUE(CheckModel(model).fits);
+  for (Image& image : model.images) {
+    for (size_t i = 1; i < image.points2D.size(); ++i) {
+      std::swap(image.points2D[i - 1].x, image.points2D[i].x);
+      std::swap(image.points2D[i - 1].y, image.points2D[i].y);
+    }
+  }
+  const ModelCheck check = CheckModel(model);
+  EXPECT_FALSE(check.fits);
+  EXPECT_TRUE(check.IsAnythingWrong());
+  EXPECT_THAT(check.misplaced_points, IsEmpty());
+}
+
+TEST(CheckModel, CallsNoImageOfAnExactModelWrong) {
+  for (int seed = 1; seed <= 10; ++seed) {
+    const ModelCheck check = CheckModel(Scene(seed, 40, 4, 0));
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty());
+  }
+}
+
 TEST(CureModel, CopiesAModelThatNothingIsWrongWith) {
   const Model model = Scene(1);
   const ModelCheck check = CheckModel(model);

@@ -5,9 +5,10 @@ Usage: planted_conventions.py KROT MODEL [DATABASE]
 
 MODEL, without rigs, is in COLMAP's conventions. Its poses are written as by each of 384 programs:
 quaternions with w first or last, rotations to or from the camera, translations or centres, right-
-or left-handed, with each of the 24 camera axes that are COLMAP's up to their directions. Prints how
-many of them were found as they are, how many otherwise though with the same errors, and how many
-not; with DATABASE the same of models without points. Needs colmap.
+or left-handed, with each of the 24 camera axes that are COLMAP's up to their directions; and, with
+COLMAP's poses, its 2D points with each of seven other axes: from another corner of the photo, or
+rows first. Prints how many of them were found as they are, how many otherwise though with the same
+errors, and how many not; with DATABASE the same of models without points. Needs colmap.
 """
 
 import collections
@@ -80,6 +81,31 @@ def plant(krot, model, folder, database, program):
     return "as they are" if is_same else "otherwise"
 
 
+def turned(x, y, width, height, axes):
+    """A pixel with x and y from the far side, or exchanged."""
+    x_from_right, y_from_bottom, rows_first = axes
+    pixel = (width - x if x_from_right else x, height - y if y_from_bottom else y)
+    return pixel[::-1] if rows_first else pixel
+
+
+def plant_pixels(krot, model, folder, axes):
+    planted = copy.deepcopy(model)
+    sizes = {row[0]: [float(v) for v in row[2:4]] for row in model.rows("cameras.txt")}
+    for image, points in planted.points2D.items():
+        width, height = sizes[planted.images[image][1]]
+        for point in points:
+            point[:2] = turned(*point[:2], width, height, axes)
+    run("rm", "-rf", folder / "planted")
+    planted.write(folder / "planted")
+    conventions = found(krot, folder, None)
+    if conventions is None:
+        return "not"
+    directions = [("right", "left"), ("down", "up")]
+    x, y = (pair[far] for pair, far in zip(directions, axes))
+    words = f"x {y}, y {x}" if axes[2] else f"x {x}, y {y}"
+    return "as they are" if conventions["pixel_axes"] == words else "otherwise"
+
+
 def main():
     if len(sys.argv) not in (3, 4):
         sys.exit(__doc__)
@@ -92,6 +118,10 @@ def main():
             plant(krot, model, folder, database[0] if database else None, program)
             for program in itertools.product(
                 *[(False, True)] * 4, axis_rotations()))
+        if not database:
+            counts.update(plant_pixels(krot, model, folder, axes)
+                          for axes in itertools.product((False, True), repeat=3)
+                          if any(axes))
     print(f"| {path.name} | " + " | ".join(
         f"{counts[how]}" for how in ("as they are", "otherwise", "not")) + " |")
 

@@ -266,6 +266,8 @@ std::optional<Conventions> FindPoses(const TrackSample& sample,
       pixels.intrinsics_factor = factor;
       pixels.has_central_principal_point = is_central;
       if (pixels.NumDifferences() == 0) continue;
+      // Photos have 2D points all around their principal points.
+      if (std::abs(std::log2(sample.MedianPlace(pixels))) > 0.5) continue;
       if (const auto found = find({pixels})) return found;
     }
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -235,6 +236,56 @@ bool MoveImages(const PairCheck& pairs, Model* moved) {
   return is_any;
 }
 
+bool Fits(const Model& model, double sigma_px) {
+  uint64_t size = 0;
+  for (const Camera& camera : model.cameras) {
+    size = std::max({size, camera.width, camera.height});
+  }
+  return sigma_px <= std::max(kFilteredPx, 0.01 * static_cast<double>(size));
+}
+
+// Those whose median error is above what passes COLMAP's filter and noise
+// explains, and falls to a quarter where their images see them. Wrong
+// observations may have bent a point; then it is not counted.
+std::vector<int32_t> MisplacedPoints(const Model& model,
+                                     const ModelCheck& check,
+                                     const Context& context) {
+  std::vector<char> is_wrong(model.track_elements.size(), 0);
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
+  for (size_t e = 0; e < image_of.size(); ++e) {
+    is_wrong[e] = check.images[image_of[e]].verdict == ImageVerdict::kWrong;
+  }
+  for (const WrongObservation& one : check.observations) {
+    is_wrong[one.element] = 1;
+  }
+  Model moved = model;
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    moved.points3D[k].xyz = check.points[k];
+  }
+  const std::vector<double> errors = PixelErrors(model, context.num_threads);
+  const std::vector<double> moved_errors =
+      PixelErrors(moved, context.num_threads);
+  const double least =
+      std::max(kFilteredPx, check.critical_w * *check.sigma_px);
+  std::vector<int32_t> misplaced;
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    const Point3D& point = model.points3D[k];
+    std::vector<double> before, after;
+    bool is_any_wrong = false;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      is_any_wrong |= is_wrong[e] != 0;
+      before.push_back(errors[e]);
+      after.push_back(moved_errors[e]);
+    }
+    if (is_any_wrong || before.empty()) continue;
+    const double median = LowerMedian(std::move(before));
+    if (median > least && LowerMedian(std::move(after)) < median / 4) {
+      misplaced.push_back(static_cast<int32_t>(k));
+    }
+  }
+  return misplaced;
+}
+
 Model Removed(const Model& model, const ModelCheck& check,
               const Context& context) {
   if (!check.IsAnythingWrong()) return model;
@@ -248,6 +299,9 @@ Model Removed(const Model& model, const ModelCheck& check,
     is_removed[one.element] = 1;
   }
   Model moved = model;
+  for (const int32_t k : check.misplaced_points) {
+    moved.points3D[k].xyz = check.points[k];
+  }
   for (size_t k = 0; k < model.points3D.size(); ++k) {
     const Point3D& point = model.points3D[k];
     bool is_any = check.conventions && check.conventions->has_wrong_points;
@@ -274,11 +328,17 @@ int64_t ModelCheck::NumImages(ImageVerdict verdict) const {
 ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
                       const Context& context) {
   const auto conventions = FindConventions(model, options.database, context);
-  ModelCheck check =
-      conventions ? CheckConverted(ConvertModel(model, *conventions, context),
-                                   options, context)
-                  : CheckConverted(model, options, context);
+  std::optional<Model> converted;
+  if (conventions) converted = ConvertModel(model, *conventions, context);
+  const Model& read = converted ? *converted : model;
+  ModelCheck check = CheckConverted(read, options, context);
   check.conventions = conventions;
+  if (check.sigma_px && !context.IsCancelled()) {
+    check.fits = Fits(read, *check.sigma_px);
+    if (check.fits && check.is_adjusted) {
+      check.misplaced_points = MisplacedPoints(read, check, context);
+    }
+  }
   check.same_photos = FindSamePhotos(model);
   return check;
 }

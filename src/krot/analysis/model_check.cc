@@ -277,6 +277,7 @@ class Checker {
   bool IsChance(size_t n, double least_lambda) const {
     const ErrorsInDisc& errors = in_disc_[n];
     return errors.num() > 0 && errors.lambda() < least_lambda &&
+           *snooping_.noise.sigma_px >= kLeastNoisePx &&
            errors.Exponent(least_lambda) > LeastExponent(n) &&
            errors.Exponent(0) < -std::log(options_.false_alarm);
   }

@@ -195,6 +195,25 @@ double TrackSample::MedianErrorWithPoints(const Conventions& from) const {
   });
 }
 
+double TrackSample::MedianPlace(const Conventions& from) const {
+  const std::vector<Camera> cameras = Cameras(from);
+  std::array<std::vector<double>, 2> ratios;
+  for (const std::vector<Sight>& track : tracks_) {
+    for (const Sight& sight : track) {
+      const Camera& camera = cameras[geometries_[sight.image].camera];
+      const CameraModelInfo& info = *FindCameraModel(camera.model_id);
+      if (!info.has_image_plane) continue;
+      const size_t center = info.param_names.substr(0, 2) == "fx" ? 2 : 1;
+      for (const size_t i : {0, 1}) {
+        ratios[i].push_back(sight.pixel[i] / camera.params[center + i]);
+      }
+    }
+  }
+  if (ratios[0].empty()) return 1;
+  return std::sqrt(LowerMedian(std::move(ratios[0])) *
+                   LowerMedian(std::move(ratios[1])));
+}
+
 void TrackSample::Measure(std::vector<Conventions>* all,
                           const Context& context) const {
   const Lenses lenses = LensesIn(all->front());

@@ -36,7 +36,7 @@ class TrackSample {
               const Roles& roles, const Database* database);
 
   bool has_points() const { return !places_.empty(); }
-  bool HasEnough() const;  // tracks to tell anything
+  bool HasEnough() const;                            // tracks to tell anything
   double largest_px() const { return largest_px_; }  // coordinate of a pixel
 
   // The median error of the sensor that has the largest; reference sensors are
@@ -47,6 +47,10 @@ class TrackSample {
   }
   // With the model's points; where there are none, where they are seen.
   double MedianErrorWithPoints(const Conventions& from) const;
+
+  // How far the 2D points are from the upper left corner, in the median, where
+  // the principal points are 1: a geometric mean of both axes.
+  double MedianPlace(const Conventions& from) const;
 
   // Sets the median errors of all, which have the same lenses and pixels.
   void Measure(std::vector<Conventions>* all, const Context& context) const;

@@ -124,7 +124,8 @@ std::string NextSteps(const CheckReport& report) {
   std::string text = "\nNext\n";
   const bool is_converted = check.conventions.has_value();
   if (report.output_path.empty() &&
-      (is_converted || (check.is_adjusted && check.IsAnythingWrong()))) {
+      (is_converted ||
+       (check.is_adjusted && check.fits && check.IsAnythingWrong()))) {
     text +=
         (is_converted ? "  The model in COLMAP's conventions, without what is "
                         "wrong:\n"
@@ -149,6 +150,14 @@ std::string NextSteps(const CheckReport& report) {
                TextIf(is_center_held,
                       " --BundleAdjustment.refine_principal_point 1")) +
            "    krot model_checker --input_path ADJUSTED\n";
+  }
+  if (!check.fits) {
+    return text +
+           "  Make the tracks anew from the matches:\n    krot "
+           "point_triangulator --database_path " +
+           database + " --input_path " + input +
+           " --output_path TRIANGULATED\n    krot model_checker --input_path "
+           "TRIANGULATED\n";
   }
   std::string model = check.IsAnythingWrong() ? cured : input;
   if (!report.moved.empty()) {
@@ -233,23 +242,19 @@ std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
 
 namespace {
 
-std::string WhatIsWrong(const CheckReport& report) {
+// What contradicts by more than noise; empty if nothing does.
+std::string WhatContradicts(const CheckReport& report) {
   const ModelCheck& check = report.check;
-  if (!check.sigma_px && !check.pairs) {
-    return "Nothing can be said: no observation is checked by another one.";
-  }
-  const auto num_images = static_cast<int64_t>(check.images.size());
   const auto num_observations = static_cast<int64_t>(check.observations.size());
   const int64_t num_wrong = check.NumImages(ImageVerdict::kWrong);
-  const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
   const int64_t num_by_matches = std::count_if(
       check.images.begin(), check.images.end(), [](const ImageCheck& image) {
         return image.fault == ImageFault::kMatches;
       });
-  const std::string noise = NoiseWords(check);
-  const std::string by_more = " by more than " + noise + " explains.";
+  const std::string by_more =
+      " by more than " + NoiseWords(check) + " explains";
   const std::string images =
-      Thousands(num_wrong) + " of " + Counted(num_images, "image");
+      Thousands(num_wrong) + " of " + Counted(check.images.size(), "image");
   const std::string observations = Thousands(num_observations) + " of " +
                                    Thousands(report.num_observations) +
                                    " observations";
@@ -260,7 +265,7 @@ std::string WhatIsWrong(const CheckReport& report) {
            are(num_wrong + num_observations) +
            "wrong: verified matches contradict " +
            Counted(num_by_matches, "image") +
-           (is_more ? ", the rest contradicts the others" + by_more : ".");
+           TextIf(is_more, ", the rest contradicts the others" + by_more);
   }
   if (num_wrong > 0 && num_observations > 0) {
     return images + " and " + observations +
@@ -275,42 +280,66 @@ std::string WhatIsWrong(const CheckReport& report) {
            (num_observations == 1 ? "it contradicts" : "they contradict") +
            " the others" + by_more;
   }
-  if (check.pairs && !check.pairs->groups.empty()) {
-    return "The images fall into " +
-           Counted(check.pairs->groups.size(), "group") +
-           " that contradict each other by their verified matches: the place "
-           "of a whole group is wrong, or those matches are.";
-  }
-  if (!check.sigma_px) {
-    return "No image is wrong by the matches, and no observation is checked by "
-           "another one.";
-  }
-  return "Nothing is wrong: all " + Thousands(report.num_observations) +
-         " observations of " + Counted(num_images, "image") + " agree within " +
-         noise +
-         TextIf(num_weak > 0, "; " + Counted(num_weak, "image", "is", "are") +
-                                  " weakly held") +
-         ".";
+  return "";
 }
 
-// Parts may be elsewhere as a whole, whatever else is wrong.
+std::string NothingIsWrong(const CheckReport& report) {
+  const ModelCheck& check = report.check;
+  if (!check.sigma_px) {
+    return check.pairs ? "No image is wrong by the matches, and no observation "
+                         "is checked by another one"
+                       : "Nothing can be said: no observation is checked by "
+                         "another one";
+  }
+  const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
+  return "Nothing is wrong: all " + Thousands(report.num_observations) +
+         " observations of " + Counted(check.images.size(), "image") +
+         " agree within " + NoiseWords(check) +
+         TextIf(num_weak > 0, "; " + Counted(num_weak, "image", "is", "are") +
+                                  " weakly held");
+}
+
 std::string ForAdjusted(const CheckReport& report) {
-  std::string text = WhatIsWrong(report);
-  const std::vector<ModelPart>& parts = report.check.parts;
-  if (parts.empty()) return text;
-  text.pop_back();  // the full stop
-  return text + (report.check.IsAnythingWrong() ? "; and " : "; but ") +
-         Counted(parts.size(), "part", "is", "are") + " loose.";
+  const ModelCheck& check = report.check;
+  std::string text = WhatContradicts(report);
+  const auto add = [&](const std::string& fault) {
+    text += (text.empty() ? "" : "; and ") + fault;
+  };
+  if (!check.misplaced_points.empty()) {
+    add(Thousands(check.misplaced_points.size()) + " of " +
+        Thousands(check.points.size()) +
+        " 3D points lie far from where the images see them");
+  }
+  if (check.pairs && !check.pairs->groups.empty()) {
+    add((text.empty() ? "The" : "the") + std::string(" images fall into ") +
+        Counted(check.pairs->groups.size(), "group") +
+        " that contradict each other by their verified matches: the place of "
+        "a whole group is wrong, or those matches are");
+  }
+  if (text.empty()) text = NothingIsWrong(report);
+  // Parts may be elsewhere as a whole, whatever else is wrong.
+  if (!check.parts.empty()) {
+    text += (check.IsAnythingWrong() ? "; and " : "; but ") +
+            Counted(check.parts.size(), "part", "is", "are") + " loose";
+  }
+  return text + ".";
 }
 
 std::string ConvertedSentence(const CheckReport& report) {
   const ModelCheck& check = report.check;
-  if (check.is_adjusted) return ForAdjusted(report);
   const bool is_camera = !check.cameras.empty();
-  const bool is_more = !check.observations.empty() ||
-                       check.NumImages(ImageVerdict::kWrong) > 0 ||
-                       (check.pairs && check.pairs->IsAnythingWrong());
-  if (!is_more) {
+  if (!check.fits && !is_camera) {
+    return (check.is_adjusted
+                ? "The observations do not fit the model: errors are "
+                : "The model is not adjusted, so adjust it first: errors "
+                  "are ") +
+           Pixels(*check.sigma_px, 1) +
+           " per axis. Unless an adjustment helps, its cameras, 2D points or "
+           "tracks are not those of these images.";
+  }
+  if (check.is_adjusted) return ForAdjusted(report);
+  if (WhatContradicts(report).empty() &&
+      !(check.pairs && check.pairs->IsAnythingWrong())) {
     return is_camera ? CamerasSentence(check)
                      : "The model is not adjusted, so nothing can be said yet: "
                        "adjust it, and check it again.";
@@ -319,18 +348,6 @@ std::string ConvertedSentence(const CheckReport& report) {
                     : "The model is not adjusted, so adjust it first.") +
          " As it stands: " + ForAdjusted(report);
 }
-
-}  // namespace
-
-std::string CheckSentence(const CheckReport& report) {
-  const auto& conventions = report.check.conventions;
-  return (conventions
-              ? ConventionsSentence(*conventions) + " Once that is put right: "
-              : "") +
-         ConvertedSentence(report);
-}
-
-namespace {
 
 std::string SamePhotosSentence(const ModelCheck& check) {
   if (check.same_photos.empty()) return "";
@@ -343,6 +360,14 @@ std::string SamePhotosSentence(const ModelCheck& check) {
 }
 
 }  // namespace
+
+std::string CheckSentence(const CheckReport& report) {
+  const auto& conventions = report.check.conventions;
+  return (conventions
+              ? ConventionsSentence(*conventions) + " Once that is put right: "
+              : "") +
+         ConvertedSentence(report);
+}
 
 std::string CheckTable(const CheckReport& report, int max_rows) {
   const ModelCheck& check = report.check;

@@ -356,6 +356,8 @@ std::string CheckJson(const CheckReport& report) {
       {"verdict", CheckSentence(report)},
       {"is_anything_wrong", check.IsAnythingWrong()},
       {"is_adjusted", check.is_adjusted},
+      {"fits", check.fits},
+      {"num_misplaced_points", check.misplaced_points.size()},
       {"conventions", JsonIf(check.conventions, ConventionsJson)},
       {"num_images", check.images.size()},
       {"num_wrong_images", check.NumImages(ImageVerdict::kWrong)},
