@@ -36,6 +36,23 @@ class Output : public ::testing::Test {
   TempFolder folder_;
 };
 
+TEST_F(Output, ReplacesNoDatabaseUnlessAsked) {
+  const auto synthesize = [&](const Words& more) {
+    return RunKrot({"model_synthesizer", "--output_path", folder_ / "scene",
+                    "--database_path", folder_ / "database.db"},
+                   more);
+  };
+  WriteBytes(folder_ / "database.db", "somebody's");
+  const KrotResult result = synthesize({});
+  EXPECT_EQ(result.exit_code, 5);
+  EXPECT_THAT(result.err, IsOneSentence("krot model_synthesizer",
+                                        "database.db: is there already"));
+  EXPECT_EQ(ReadBytes(folder_ / "database.db"), "somebody's");
+  EXPECT_FALSE(fs::exists(folder_ / "scene"));
+  Succeeded(synthesize({"--overwrite", "1"}));
+  EXPECT_NE(ReadBytes(folder_ / "database.db"), "somebody's");
+}
+
 TEST_F(Output, ThatCannotBeWrittenIsRefusedBeforeTheSolve) {
   WriteBytes(folder_ / "file", "");
   const Words names = FileNames(folder_.path());

@@ -172,6 +172,8 @@ TEST_F(ToleranceAnalyzer, RefusesWhatTheModelDoesNotHave) {
            {"images", "nobody.jpg"},
            {"points", "123456789"},
            {"gauge_images", model_.images[0].name},
+           {"gauge_images",
+            model_.images[0].name + "," + model_.images[0].name},
        }) {
     const KrotResult result = Analyze({"--ToleranceAnalyzer." + option, value});
     EXPECT_EQ(result.exit_code, 1) << option;

@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -179,6 +180,10 @@ int RunModelSynthesizer(const std::vector<std::string>& arguments) {
     CheckWritable(options.ground_truth_path, write_options);
   }
   CheckSidePath("database_path", options.database_path);
+  if (std::filesystem::exists(options.database_path) && !options.overwrite) {
+    throw WriteError(options.database_path +
+                     ": is there already; set overwrite to replace it");
+  }
 
   const SyntheticScene scene = Synthesize(scene_options);
   DeferInterrupts();

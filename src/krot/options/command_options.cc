@@ -365,8 +365,9 @@ ToleranceOptions ResolveToleranceOptions(const ToleranceArguments& arguments,
   options.points = FindPoints(arguments.points, model);
   options.gauge_images =
       FindImages("gauge_images", arguments.gauge_images, model);
-  if (!options.gauge_images.empty() && options.gauge_images.size() != 2) {
-    Refuse("gauge_images", arguments.gauge_images, "two images");
+  const std::vector<int32_t>& held = options.gauge_images;
+  if (!held.empty() && (held.size() != 2 || held[0] == held[1])) {
+    Refuse("gauge_images", arguments.gauge_images, "two images that differ");
   }
   if (options.images.empty() && options.points.empty()) {
     options.images.resize(model.images.size());

@@ -118,7 +118,8 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
       context.Note(
           std::to_string(num_missing) +
           " observations are left out because they have no pose or are "
-          "behind their cameras; --Solver.init feasible takes them in");
+          "behind their cameras; krot solver --Solver.init feasible takes "
+          "them in");
     }
     return own;
   }

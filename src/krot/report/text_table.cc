@@ -129,7 +129,7 @@ void AddErrorColumns(const std::vector<PixelErrorStatistics>& estimates,
   const auto add = [&](const char* name, double PixelErrorStatistics::*error) {
     Row row = {name};
     for (const PixelErrorStatistics& errors : estimates) {
-      row.push_back(FormatNumber(errors.*error, 4));
+      row.push_back(errors.count == 0 ? "-" : FormatNumber(errors.*error, 4));
     }
     table->AddRow(row);
   };
