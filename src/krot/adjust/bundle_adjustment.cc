@@ -238,18 +238,20 @@ std::vector<double> UpperQuartiles(const Context& context,
   return quartiles;
 }
 
-// The part of the problem that a frame sees: it and its points may move.
+// The part of the problem that a frame sees: it and its points may move, and
+// all else is as it is.
 AdjustmentBlocks PartAround(int32_t frame, const AdjustmentBlocks& blocks) {
   AdjustmentBlocks part = blocks;
   part.num_images = 1;
-  part.positions.clear();
-  part.distances.clear();
   part.frame_is_fixed.assign(part.frames.size(), 1);
   part.frame_is_fixed[frame] = 0;
   part.sensor_is_fixed.assign(part.sensors.size(), 1);
   std::vector<char> is_seen(part.points.size(), 0);
   for (const AdjustmentObservation& observation : blocks.observations) {
     if (observation.frame == frame) is_seen[observation.point] = 1;
+  }
+  for (size_t k = 0; k < is_seen.size(); ++k) {
+    if (is_seen[k] == 0) part.point_is_fixed[k] = 1;
   }
   part.observations.erase(
       std::remove_if(part.observations.begin(), part.observations.end(),
@@ -294,8 +296,11 @@ void Minimize(const BundleAdjustmentOptions& options, const Context& context,
   if (options.loss != RobustLoss::kCauchy || !options.refine_rig_from_world) {
     return;
   }
+  context.Stage("looking for frames that are far off");
   const std::vector<double> quartiles = UpperQuartiles(context, *blocks);
-  const double median = MedianOf(quartiles, context);
+  std::vector<double> of_seen = quartiles;
+  of_seen.erase(std::remove(of_seen.begin(), of_seen.end(), 0), of_seen.end());
+  const double median = MedianOf(of_seen, context);
   for (size_t f = 0; f < quartiles.size() && !context.IsCancelled(); ++f) {
     if (blocks->frame_is_fixed[f] != 0 || quartiles[f] <= 2 * median) continue;
     summary->num_moved_frames += MoveFrame(

@@ -150,7 +150,8 @@ Model ConvertModel(const Model& model, const Conventions& from,
   }
   FollowFrames(&converted);
   const std::vector<ImageGeometry> geometries = ImageGeometries(converted);
-  for (size_t n = 0; n < converted.images.size(); ++n) {
+  const bool turns_pixels = !from.pixel_from_file_axes.isIdentity();
+  for (size_t n = 0; turns_pixels && n < converted.images.size(); ++n) {
     for (Point2D& point : converted.images[n].points2D) {
       const Vector2d pixel = from.ToColmap(
           Vector2d(point.x, point.y), converted.cameras[geometries[n].camera]);

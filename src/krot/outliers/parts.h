@@ -277,9 +277,9 @@ inline constexpr double kLargestScale = 30;
 
 // The part of a problem that could grow or shrink most at a small rise of the
 // errors of the `kept` observations (marked), which alone count: hinges are
-// found. To first order: scale_factor is 1 + 3
-// standard deviations. Of the estimate only the translations are used. Points
-// are placed as FindWeakLinks does. None if nothing can grow.
+// found. To first order: scale_factor is 1 + 3 standard deviations. Of the
+// estimate only the translations are used. Points are placed as FindWeakLinks
+// does. None if nothing can grow.
 std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
                                      const Estimate& estimate,
                                      const std::vector<char>& kept, double cap,

@@ -46,10 +46,17 @@ std::string CameraFaultWords(const WrongCamera& camera) {
       (is_one ? "image asks" : Counted(camera.num_images, "image") + " ask") +
       " for ";
   switch (camera.fault) {
-    case CameraFault::kFocalLength:
-      return "its focal length is " + FormatNumber(camera.focal_length_px, 1) +
-             " px, and " + ask + "about " +
-             FormatNumber(camera.asked_focal_length_px, 1) + " px";
+    case CameraFault::kFocalLength: {
+      // What is asked for is known to first order.
+      const double ratio =
+          camera.asked_focal_length_px / camera.focal_length_px;
+      const std::string asked =
+          ratio > 1.2   ? "a far longer one"
+          : ratio < 0.8 ? "a far shorter one"
+                        : "about " + Pixels(camera.asked_focal_length_px, 1);
+      return "its focal length is " + Pixels(camera.focal_length_px, 1) +
+             ", and " + ask + asked;
+    }
     case CameraFault::kPrincipalPoint:
       return ask + "another principal point, about " +
              FormatNumber(camera.offset_px, 1) + " px away";

@@ -141,9 +141,9 @@ std::string PairTable(const PairCheck& check, int max_rows) {
       names.push_back(check.images[i].name);
     }
     text += "The matches cannot tell this from another explanation: " +
-            (names.empty() ? "no image is wrong, their matches are"
+            (names.empty() ? "no image is wrong"
                            : "wrong images are " + ListText(names)) +
-            ".\n";
+            ", and all other matches that contradict are wrong.\n";
   }
   text +=
       "What matches do not show: equal structures whose wrong matches agree "

@@ -4,6 +4,7 @@
 #include <sstream>
 #include <vector>
 
+#include "krot/analysis/noise.h"
 #include "krot/problem/cost.h"
 #include "krot/report/reports.h"
 #include "krot/report/sentences.h"
@@ -262,7 +263,12 @@ std::string BracketOf(const SolveReport& report) {
          TextIf(outliers.num_points_removed > 0,
                 "; with them went " +
                     Counted(outliers.num_points_removed, "track")) +
-         ".\n";
+         "." +
+         TextIf(outliers.init == SolveInit::kFeasible &&
+                    outliers.max_error > 5 * kFilteredPx,
+                " With rotations as they should be a few pixels are enough: "
+                "adjust the model, rotations free (krot bundle_adjuster).") +
+         "\n";
 }
 
 }  // namespace
