@@ -273,6 +273,16 @@ TEST(FindConventions, FindsPointsThatAreNotWhereImagesSeeThem) {
   EXPECT_LE(Summarize(PixelErrors(cured)).rms, before);
 }
 
+// The images see all points 8 px from where these project.
+TEST(FindConventions, BlamesNoPointsForTheirCamerasPrincipalPoint) {
+  Model model = SynthesizeScene(SceneOf(40, 200, 3, 0.3, 4)).model;
+  for (Camera& camera : model.cameras) camera.params[1] += 8;
+  EXPECT_FALSE(FindConventions(model));
+  const ModelCheck check = CheckModel(model);
+  EXPECT_FALSE(check.is_adjusted);
+  EXPECT_TRUE(check.misplaced_points.empty());
+}
+
 TEST(FindConventions, CallsPointsWrongOnlyOfSoundPoses) {
   Model model = SceneOfColmap(6);
   for (Camera& camera : model.cameras) camera.params[0] *= 1.2;

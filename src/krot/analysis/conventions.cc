@@ -193,10 +193,11 @@ constexpr double kFits = 0.01;
 // The error below which a reading fits.
 double FitPx(const TrackSample& sample) { return kFits * sample.largest_px(); }
 
-// Points may be right where poses are read wrongly.
+// Points may be right where poses are read wrongly, or where cameras are wrong.
 bool HasWrongPoints(const TrackSample& sample, const Conventions& from) {
-  return sample.MedianErrorWithPoints(from) >
-         std::max(kFilteredPx, kClearly * from.median_error_px);
+  const double most = std::max(kFilteredPx, kClearly * from.median_error_px);
+  return sample.MedianErrorWithPoints(from) > most &&
+         sample.MedianErrorOfMapped(from) > most;
 }
 
 // Smaller if simpler. Mirrored 2D points are like left-handed axes, which are

@@ -338,6 +338,11 @@ ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
     if (check.fits && check.is_adjusted) {
       check.misplaced_points = MisplacedPoints(read, check, context);
     }
+    // FindConventions calls most points wrong unless cameras are why.
+    if (2 * check.misplaced_points.size() > read.points3D.size()) {
+      check.misplaced_points.clear();
+      check.is_adjusted = false;
+    }
   }
   check.same_photos = FindSamePhotos(model);
   return check;

@@ -48,6 +48,10 @@ class TrackSample {
   // With the model's points; where there are none, where they are seen.
   double MedianErrorWithPoints(const Conventions& from) const;
 
+  // The same, where all projections are mapped affinely to where the images
+  // have them: small if the cameras are wrong, and the points are not.
+  double MedianErrorOfMapped(const Conventions& from) const;
+
   // How far the 2D points are from the upper left corner, in the median, where
   // the principal points are 1: a geometric mean of both axes.
   double MedianPlace(const Conventions& from) const;
