@@ -237,12 +237,12 @@ std::optional<Conventions> FindPoses(const TrackSample& sample,
   const auto find = [&](const std::vector<Conventions>& of_pixels) {
     std::vector<Conventions> all;
     for (const Conventions& pixels : of_pixels) {
-      std::vector<Conventions> of_poses;
+      std::vector<Conventions> of_pixel;
       for (const PoseConventions& poses : PoseConventions::All()) {
-        of_poses.emplace_back(pixels).poses = poses;
+        of_pixel.emplace_back(pixels).poses = poses;
       }
-      sample.Measure(&of_poses, context);
-      all.insert(all.end(), of_poses.begin(), of_poses.end());
+      sample.Measure(&of_pixel, context);
+      all.insert(all.end(), of_pixel.begin(), of_pixel.end());
     }
     Conventions best = SimplestOfBest(all);
     // If points alone are wrong, the poses are as good as COLMAP's.
@@ -255,6 +255,14 @@ std::optional<Conventions> FindPoses(const TrackSample& sample,
     best.has_wrong_points = fits && HasWrongPoints(sample, best);
     return fits ? std::optional(best) : std::nullopt;
   };
+  const auto of_poses = find({Conventions()});
+  if (of_poses && !of_poses->poses.is_left_handed &&
+      !of_poses->has_wrong_points &&
+      of_poses->median_error_px <= kFilteredPx / 4) {
+    return of_poses;
+  }
+  // Mirrored 2D points may fit better than left-handed axes, and others than
+  // points that are elsewhere or poses that leave some error.
   std::vector<Conventions> of_axes;
   for (const Matrix2d& axes : Conventions::AllPixelAxes()) {
     of_axes.emplace_back().pixel_from_file_axes = axes;
