@@ -328,8 +328,8 @@ struct ModelCheck {
   std::optional<double> median_scale_px;  // where keypoint scales are known
   double critical_w = 0;
   // Whether most images stand where their own errors would put them, up to half
-  // of an image's noise. If not, no image can be called misplaced, and the
-  // model should be adjusted first.
+  // of an image's noise, and most points where these see them. If not, no image
+  // can be called misplaced, and the model should be adjusted first.
   bool is_adjusted = true;
   // Whether sigma_px is within the 4 px of COLMAP's filter or a hundredth of
   // the photos' size. If not, cameras, 2D points and tracks are hardly those of

@@ -425,6 +425,57 @@ TEST(UnreliableSentence, SaysWhichImagesAreAComponentOfTheirOwn) {
                     HasSubstr("; if that is so of each part alone, look at")));
 }
 
+TEST(SolveTable, AsksForAnAdjustmentWhereRoughRotationsSetTheBound) {
+  SolveReport report = SomeReport();
+  OutlierFilterSummary& outliers = report.outliers.emplace();
+  outliers.init = SolveInit::kFeasible;
+  outliers.max_error = 40;
+  EXPECT_THAT(SolveTable(report), HasSubstr("rotations free"));
+  outliers.max_error = 8;
+  EXPECT_THAT(SolveTable(report), Not(HasSubstr("rotations free")));
+}
+
+TEST(SolveTable, HasNoErrorsWhereThereAreNoPositionsYet) {
+  SolveReport report = SomeReport();
+  report.summary.pixel_error_before = {};
+  EXPECT_THAT(SolveTable(report),
+              HasSubstr("max error                         -  0.2500"));
+}
+
+CheckReport ReportOfCamera(double asked_px) {
+  CheckReport report;
+  report.check.is_adjusted = false;
+  WrongCamera& camera = report.check.cameras.emplace_back();
+  camera.camera_id = 1;
+  camera.num_images = 3;
+  camera.fault = CameraFault::kFocalLength;
+  camera.focal_length_px = 1000;
+  camera.asked_focal_length_px = asked_px;
+  return report;
+}
+
+TEST(CheckSentence, GivesNoNumberOfAFarFocalLength) {
+  EXPECT_THAT(CheckSentence(ReportOfCamera(1100)), HasSubstr("about 1100.0"));
+  EXPECT_THAT(CheckSentence(ReportOfCamera(300)), HasSubstr("far shorter"));
+  EXPECT_THAT(CheckSentence(ReportOfCamera(2000)), HasSubstr("far longer"));
+}
+
+TEST(CheckSentence, NamesGroupsAndPointsBesideObservations) {
+  CheckReport report;
+  report.num_observations = 100;
+  report.check.sigma_px = 0.5;
+  report.check.observations.resize(2);
+  report.check.points.resize(50);
+  report.check.misplaced_points = {1, 2, 3};
+  report.check.pairs.emplace().groups.resize(2);
+  EXPECT_THAT(CheckSentence(report),
+              AllOf(HasSubstr("2 of 100 observations are wrong"),
+                    HasSubstr("; and 3 of 50 3D points lie far"),
+                    HasSubstr("; and the images fall into 2 groups")));
+  report.check.fits = false;
+  EXPECT_THAT(CheckSentence(report), HasSubstr("do not fit the model"));
+}
+
 TEST(NormName, IsWhatTheOptionTakes) {
   EXPECT_EQ(NormName(Norm::L1()), "1");
   EXPECT_EQ(NormName(Norm::L2()), "2");

@@ -234,41 +234,45 @@ std::optional<Conventions> FindPoses(const TrackSample& sample,
   const double as_read = sample.MedianErrorWithPoints({});
   if (as_read <= kFilteredPx) return Conventions();
   const double seen = sample.MedianErrorWhereSeen({});
-  const auto find = [&](const std::vector<Conventions>& of_pixels) {
-    std::vector<Conventions> all;
-    for (const Conventions& pixels : of_pixels) {
-      std::vector<Conventions> of_pixel;
-      for (const PoseConventions& poses : PoseConventions::All()) {
-        of_pixel.emplace_back(pixels).poses = poses;
-      }
-      sample.Measure(&of_pixel, context);
-      all.insert(all.end(), of_pixel.begin(), of_pixel.end());
+  std::vector<Conventions> all;  // that have been asked
+  const auto ask = [&](const Conventions& pixels) {
+    std::vector<Conventions> of_poses;
+    for (const PoseConventions& poses : PoseConventions::All()) {
+      of_poses.emplace_back(pixels).poses = poses;
     }
+    sample.Measure(&of_poses, context);
+    all.insert(all.end(), of_poses.begin(), of_poses.end());
+  };
+  const auto find = [&]() -> std::optional<Conventions> {
     Conventions best = SimplestOfBest(all);
     // If points alone are wrong, the poses are as good as COLMAP's.
     const double limit = best.NumDifferences() == 0
                              ? kFilteredPx
                              : std::min(FitPx(sample), seen / kClearly);
-    const bool fits =
-        best.median_error_px <= std::min(limit, as_read / kClearly);
+    if (best.median_error_px > std::min(limit, as_read / kClearly)) {
+      return std::nullopt;
+    }
     best.median_error_as_read_px = as_read;
-    best.has_wrong_points = fits && HasWrongPoints(sample, best);
-    return fits ? std::optional(best) : std::nullopt;
+    best.has_wrong_points = HasWrongPoints(sample, best);
+    return best;
   };
-  const auto of_poses = find({Conventions()});
-  if (of_poses && !of_poses->poses.is_left_handed &&
-      !of_poses->has_wrong_points &&
-      of_poses->median_error_px <= kFilteredPx / 4) {
-    return of_poses;
-  }
+  ask({});
+  std::optional<Conventions> found = find();
   // Mirrored 2D points may fit better than left-handed axes, and others than
-  // points that are elsewhere or poses that leave some error.
-  std::vector<Conventions> of_axes;
-  for (const Matrix2d& axes : Conventions::AllPixelAxes()) {
-    of_axes.emplace_back().pixel_from_file_axes = axes;
-    if (!sample.has_points()) break;  // a database's keypoints are COLMAP's
+  // points that are elsewhere or poses that leave some error. Keypoints of a
+  // database are COLMAP's.
+  const bool is_all = found && !found->poses.is_left_handed &&
+                      !found->has_wrong_points &&
+                      found->median_error_px <= kFilteredPx / 4;
+  if (!is_all && sample.has_points()) {
+    for (const Matrix2d& axes : Conventions::AllPixelAxes()) {
+      Conventions pixels;
+      pixels.pixel_from_file_axes = axes;
+      if (pixels.NumDifferences() > 0) ask(pixels);
+    }
+    found = find();
   }
-  if (const auto found = find(of_axes)) return found;
+  if (found) return found;
   if (seen <= FitPx(sample)) return std::nullopt;  // others do worse
   for (const double factor : {1.0, 0.5, 2.0, 0.25, 4.0, 0.125, 8.0}) {
     for (const bool is_central : {false, true}) {
@@ -278,7 +282,9 @@ std::optional<Conventions> FindPoses(const TrackSample& sample,
       if (pixels.NumDifferences() == 0) continue;
       // Photos have 2D points all around their principal points.
       if (std::abs(std::log2(sample.MedianPlace(pixels))) > 0.5) continue;
-      if (const auto found = find({pixels})) return found;
+      all.clear();
+      ask(pixels);
+      if ((found = find())) return found;
     }
   }
   return std::nullopt;

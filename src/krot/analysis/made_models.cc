@@ -244,20 +244,25 @@ bool Fits(const Model& model, double sigma_px) {
   return sigma_px <= std::max(kFilteredPx, 0.01 * static_cast<double>(size));
 }
 
+// Marks the track elements that are wrong, or of wrong images.
+std::vector<char> WrongElements(const Model& model, const ModelCheck& check) {
+  std::vector<char> is_wrong;
+  for (const int32_t n : ImagesOfElements(model)) {
+    is_wrong.push_back(check.images[n].verdict == ImageVerdict::kWrong);
+  }
+  for (const WrongObservation& one : check.observations) {
+    is_wrong[one.element] = 1;
+  }
+  return is_wrong;
+}
+
 // Those whose median error is above what passes COLMAP's filter and noise
 // explains, and falls to a quarter where their images see them. Wrong
 // observations may have bent a point; then it is not counted.
 std::vector<int32_t> MisplacedPoints(const Model& model,
                                      const ModelCheck& check,
                                      const Context& context) {
-  std::vector<char> is_wrong(model.track_elements.size(), 0);
-  const std::vector<int32_t> image_of = ImagesOfElements(model);
-  for (size_t e = 0; e < image_of.size(); ++e) {
-    is_wrong[e] = check.images[image_of[e]].verdict == ImageVerdict::kWrong;
-  }
-  for (const WrongObservation& one : check.observations) {
-    is_wrong[one.element] = 1;
-  }
+  const std::vector<char> is_wrong = WrongElements(model, check);
   Model moved = model;
   for (size_t k = 0; k < model.points3D.size(); ++k) {
     moved.points3D[k].xyz = check.points[k];
@@ -293,11 +298,7 @@ Model Removed(const Model& model, const ModelCheck& check,
   for (const ImageCheck& image : check.images) {
     is_wrong_image.push_back(image.verdict == ImageVerdict::kWrong);
   }
-  const std::vector<int32_t> image_of = ImagesOfElements(model);
-  std::vector<char> is_removed(model.track_elements.size(), 0);
-  for (const WrongObservation& one : check.observations) {
-    is_removed[one.element] = 1;
-  }
+  const std::vector<char> is_removed = WrongElements(model, check);
   Model moved = model;
   for (const int32_t k : check.misplaced_points) {
     moved.points3D[k].xyz = check.points[k];
@@ -306,7 +307,6 @@ Model Removed(const Model& model, const ModelCheck& check,
     const Point3D& point = model.points3D[k];
     bool is_any = check.conventions && check.conventions->has_wrong_points;
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      is_removed[e] |= is_wrong_image[image_of[e]];
       is_any |= is_removed[e];
     }
     if (is_any) moved.points3D[k].xyz = check.points[k];
