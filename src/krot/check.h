@@ -123,8 +123,22 @@ struct PoseConventions {
   int NumDifferences() const;
 };
 
+// One map along the photo's axes that takes the pixels at which cameras see the
+// model's points to where some images have them.
+struct PixelMap {
+  std::vector<int32_t> images;  // three and more, in Model::images, ascending
+  std::vector<std::string> image_names;
+  // Their cameras with the intrinsics that all of their images ask for. Empty if
+  // other images of these cameras fit, or no intrinsics explain the map: then
+  // the 2D points are those of other photos.
+  std::vector<Camera> cameras;
+  // The image's pixel of a camera's (x, y, 1).
+  Eigen::Matrix<double, 2, 3> image_from_camera;
+};
+
 // How a model's numbers differ from COLMAP's, because they come from a program
-// that writes the same things otherwise.
+// that writes the same things otherwise, or because some are those of other
+// photos.
 struct Conventions {
   PoseConventions poses;  // of images; in rigs, those of frames
   // Of the other sensors in a rig, which is their world; it has the file's
@@ -142,11 +156,14 @@ struct Conventions {
   Eigen::Matrix2d pixel_from_file_axes = Eigen::Matrix2d::Identity();
   // The 3D points are not where their images see them.
   bool has_wrong_points = false;
+  // Where cameras or 2D points are not the images', while poses and 3D points
+  // are right.
+  std::vector<PixelMap> pixel_maps;
 
   // Median reprojection errors of a sample of the model's tracks, pixels: as it
   // stands, and so converted, with points where their images see them. No error
   // counts more than the size of the photo. If only the sensors of rigs are
-  // written otherwise, these are the errors in their images.
+  // written otherwise, or some pixels mapped, these are the errors in their images.
   double median_error_as_read_px = 0;
   double median_error_px = 0;
 

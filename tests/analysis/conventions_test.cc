@@ -273,20 +273,103 @@ TEST(FindConventions, FindsPointsThatAreNotWhereImagesSeeThem) {
   EXPECT_LE(Summarize(PixelErrors(cured)).rms, before);
 }
 
-// The images see all points 8 px from where these project.
-TEST(FindConventions, BlamesNoPointsForTheirCamerasPrincipalPoint) {
-  Model model = SynthesizeScene(SceneOf(40, 200, 3, 0.3, 4)).model;
-  for (Camera& camera : model.cameras) camera.params[1] += 8;
-  EXPECT_FALSE(FindConventions(model));
-  const ModelCheck check = CheckModel(model);
-  EXPECT_FALSE(check.is_adjusted);
-  EXPECT_TRUE(check.misplaced_points.empty());
+// The model is put right where poses and points of the file are: its cameras
+// then are those with which it was made.
+TEST(FindConventions, FindsIntrinsicsThatAllImagesAskFor) {
+  const Model sound = SynthesizeScene(SceneOf(40, 400, 3, 0.3, 4)).model;
+  using Spoils = void (*)(std::vector<double>*);
+  for (const Spoils spoil : std::vector<Spoils>{
+           [](std::vector<double>* f_cx_cy) { (*f_cx_cy)[1] += 8; },
+           [](std::vector<double>* f_cx_cy) { (*f_cx_cy)[0] *= 1.05; },
+           [](std::vector<double>* f_cx_cy) {
+             std::swap((*f_cx_cy)[1], (*f_cx_cy)[2]);
+           }}) {
+    Model model = sound;
+    for (Camera& camera : model.cameras) spoil(&camera.params);
+    const auto found = FindConventions(model);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->NumDifferences(), 1);
+    ASSERT_EQ(found->pixel_maps.size(), 1);
+    EXPECT_EQ(found->pixel_maps[0].images.size(), 40);
+    EXPECT_EQ(found->pixel_maps[0].cameras.size(), model.cameras.size());
+    const Model converted = ConvertModel(model, *found);
+    for (size_t c = 0; c < model.cameras.size(); ++c) {
+      for (size_t i = 0; i < 3; ++i) {
+        EXPECT_NEAR(converted.cameras[c].params[i], sound.cameras[c].params[i],
+                    0.2);
+      }
+    }
+    const ModelCheck check = CheckModel(model);
+    EXPECT_TRUE(check.is_adjusted);
+    EXPECT_EQ(check.NumImages(ImageVerdict::kWrong), 0);
+    EXPECT_TRUE(check.observations.empty());
+  }
 }
 
-TEST(FindConventions, CallsPointsWrongOnlyOfSoundPoses) {
-  Model model = SceneOfColmap(6);
-  for (Camera& camera : model.cameras) camera.params[0] *= 1.2;
+// Half of the images, or all: 2D points of photos of half the size, turned by
+// 90 degrees, mirrored, cropped, normalised, or from the middle of the photo.
+TEST(FindConventions, Finds2DPointsOfOtherPhotos) {
+  const Model sound = SynthesizeScene(SceneOf(12, 400, 4, 0.3, 4)).model;
+  const double width = static_cast<double>(sound.cameras[0].width);
+  const double height = static_cast<double>(sound.cameras[0].height);
+  using Matrix23 = Eigen::Matrix<double, 2, 3>;
+  const auto map_of = [](double xx, double xy, double x, double yx, double yy,
+                         double y) {
+    Matrix23 map;
+    map << xx, xy, x, yx, yy, y;
+    return map;
+  };
+  const auto expect_found = [&](const Matrix23& map, size_t stride) {
+    Model model = sound;
+    std::vector<int32_t> images;
+    for (size_t n = 0; n < model.images.size(); n += stride) {
+      images.push_back(static_cast<int32_t>(n));
+      for (Point2D& point : model.images[n].points2D) {
+        const Eigen::Vector2d pixel = map * Vector3d(point.x, point.y, 1);
+        point.x = pixel.x();
+        point.y = pixel.y();
+      }
+    }
+    const auto found = FindConventions(model);
+    ASSERT_TRUE(found) << map;
+    ASSERT_EQ(found->pixel_maps.size(), 1) << map;
+    EXPECT_EQ(found->pixel_maps[0].images, images);
+    EXPECT_TRUE(found->pixel_maps[0].cameras.empty());
+    EXPECT_EQ(found->NumDifferences(), 1);
+    const Model converted = ConvertModel(model, *found);
+    for (size_t n = 0; n < model.images.size(); ++n) {
+      for (size_t i = 0; i < model.images[n].points2D.size(); ++i) {
+        const Point2D& before = sound.images[n].points2D[i];
+        const Point2D& after = converted.images[n].points2D[i];
+        EXPECT_NEAR(std::hypot(after.x - before.x, after.y - before.y), 0, 0.4);
+      }
+    }
+  };
+  for (const Matrix23& map :
+       {map_of(0.5, 0, 0, 0, 0.5, 0), map_of(0, 1, 0, -1, 0, width),
+        map_of(-1, 0, width, 0, 1, 0), map_of(1.1, 0, -60, 0, 1.1, -40)}) {
+    expect_found(map, /*stride=*/2);
+  }
+  expect_found(map_of(1 / width, 0, 0, 0, 1 / height, 0), 1);
+  expect_found(map_of(1, 0, -width / 2, 0, 1, -height / 2), 1);
+}
+
+// A small turn moves all pixels alike, up to the bend of the image plane.
+TEST(FindConventions, TakesNoTurnForOtherPixels) {
+  const Eigen::Quaterniond turn(
+      Eigen::AngleAxisd(0.02, Vector3d(0.2, 1, 0).normalized()));
+  Model model = SynthesizeScene(SceneOf(12, 400, 4, 0.3, 4)).model;
+  for (size_t n = 0; n < 5; ++n) {
+    Pose& pose = model.frames[n].rig_from_world;
+    pose = ToPose(RigidTransform{turn.toRotationMatrix() * pose.Rotation(),
+                                 turn * pose.translation});
+  }
   EXPECT_FALSE(FindConventions(model));
+  Model rig = RigSceneOfColmap();
+  Pose& pose = *rig.rigs[0].sensors[1].sensor_from_rig;
+  pose = ToPose(RigidTransform{turn.toRotationMatrix() * pose.Rotation(),
+                               turn * pose.translation});
+  EXPECT_FALSE(FindConventions(rig));
 }
 
 // Several programs write the sensors of a level rig alike, so it only counts

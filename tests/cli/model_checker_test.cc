@@ -102,6 +102,42 @@ TEST_F(ModelCheckerCommand, ConvertsAModelThatIsNotInColmapsConventions) {
               HasSubstr("is not in COLMAP's conventions, but has poses"));
 }
 
+TEST_F(ModelCheckerCommand, PutsIntrinsicsRightThatAllImagesAskFor) {
+  Model model = Load(folder_ / "sound");
+  model.cameras[0].params[1] += 20;
+  Save(model, folder_ / "shifted");
+  const KrotResult result =
+      Succeeded(Check("shifted", {"--output_path", folder_ / "cured",
+                                  "--report_path", folder_ / "r.json"}));
+  EXPECT_THAT(result.out,
+              StartsWith("Camera 1 is wrong: its 8 images ask for the "
+                         "principal point ("));
+  EXPECT_THAT(result.out,
+              HasSubstr(" px. Once that is put right: Nothing is wrong: all "));
+  const Json map = ReadJson(folder_ / "r.json")["conventions"]["pixel_maps"][0];
+  EXPECT_EQ(map["images"].size(), 8u);
+  EXPECT_NEAR(map["cameras"][0]["params"][1], model.cameras[0].params[1] - 20,
+              1);
+  Succeeded(Check("cured", {"--fail_on", "wrong"}));
+}
+
+TEST_F(ModelCheckerCommand, Puts2DPointsOfOtherPhotosRight) {
+  Model model = Load(folder_ / "sound");
+  for (const size_t n : {0, 2, 4}) {
+    for (Point2D& point : model.images[n].points2D) {
+      point.x /= 2;
+      point.y /= 2;
+    }
+  }
+  Save(model, folder_ / "half");
+  const KrotResult result =
+      Succeeded(Check("half", {"--output_path", folder_ / "cured"}));
+  EXPECT_THAT(result.out,
+              StartsWith("The 2D points of 3 images (" + model.images[0].name +
+                         ", ...) are not those of their photos, but 0.5"));
+  Succeeded(Check("cured", {"--fail_on", "wrong"}));
+}
+
 TEST_F(ModelCheckerCommand, NamesWhatIsWrongAndWritesTheModelWithout) {
   const KrotResult result = Succeeded(
       Check("faulty", {"--output_path", folder_ / "cured", "--report_path",

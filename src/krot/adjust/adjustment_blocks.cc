@@ -244,7 +244,7 @@ void MovePose(const AdjustmentColumns::Pose& columns, const PoseBlock& from,
 std::vector<int> RefinedParams(int camera_model,
                                const BundleAdjustmentOptions& options) {
   const CameraModelInfo& info = *FindCameraModel(camera_model);
-  const int num_focal = info.param_names.substr(0, 2) == "fx" ? 2 : 1;
+  const int num_focal = info.num_focal_lengths();
   std::vector<int> refined;
   for (int i = 0; i < info.num_params; ++i) {
     const bool is_refined = i < num_focal       ? options.refine_focal_length

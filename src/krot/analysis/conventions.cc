@@ -79,7 +79,8 @@ int PoseConventions::NumDifferences() const {
 int Conventions::NumDifferences() const {
   return poses.NumDifferences() + sensors.NumDifferences() + (rig_factor != 1) +
          (intrinsics_factor != 1) + has_central_principal_point +
-         !pixel_from_file_axes.isIdentity();
+         !pixel_from_file_axes.isIdentity() +
+         static_cast<int>(pixel_maps.size());
 }
 
 std::vector<Matrix2d> Conventions::AllPixelAxes() {
@@ -112,8 +113,8 @@ Camera Conventions::ToColmap(const Camera& camera) const {
   const double factor = intrinsics_factor;
   converted.width = std::llround(factor * static_cast<double>(camera.width));
   converted.height = std::llround(factor * static_cast<double>(camera.height));
-  const size_t center = info.param_names.substr(0, 2) == "fx" ? 2 : 1;
-  for (size_t i = 0; i < center + 2; ++i) converted.params[i] *= factor;
+  const int center = info.num_focal_lengths();
+  for (int i = 0; i < center + 2; ++i) converted.params[i] *= factor;
   if (has_central_principal_point) {
     converted.params[center] = static_cast<double>(converted.width) / 2;
     converted.params[center + 1] = static_cast<double>(converted.height) / 2;
@@ -135,6 +136,28 @@ Vector3d Conventions::ToColmap(const Vector3d& xyz) const {
   return poses.is_left_handed ? Vector3d(kMirror * xyz) : xyz;
 }
 
+namespace {
+
+void Apply(const PixelMap& map, Model* model) {
+  for (const Camera& camera : map.cameras) {
+    *std::find_if(model->cameras.begin(), model->cameras.end(),
+                  [&](const Camera& own) { return own.id == camera.id; }) =
+        camera;
+  }
+  if (!map.cameras.empty()) return;
+  const Matrix2d back = map.image_from_camera.leftCols<2>().inverse();
+  for (const int32_t n : map.images) {
+    for (Point2D& point : model->images[n].points2D) {
+      const Vector2d pixel =
+          back * (Vector2d(point.x, point.y) - map.image_from_camera.col(2));
+      point.x = pixel.x();
+      point.y = pixel.y();
+    }
+  }
+}
+
+}  // namespace
+
 Model ConvertModel(const Model& model, const Conventions& from,
                    const Context& context) {
   Model converted = model;
@@ -149,6 +172,7 @@ Model ConvertModel(const Model& model, const Conventions& from,
     frame.rig_from_world = from.ToColmap(frame.rig_from_world);
   }
   FollowFrames(&converted);
+  for (const PixelMap& map : from.pixel_maps) Apply(map, &converted);
   const std::vector<ImageGeometry> geometries = ImageGeometries(converted);
   const bool turns_pixels = !from.pixel_from_file_axes.isIdentity();
   for (size_t n = 0; turns_pixels && n < converted.images.size(); ++n) {
@@ -193,11 +217,10 @@ constexpr double kFits = 0.01;
 // The error below which a reading fits.
 double FitPx(const TrackSample& sample) { return kFits * sample.largest_px(); }
 
-// Points may be right where poses are read wrongly, or where cameras are wrong.
+// Points may be right where poses are read wrongly.
 bool HasWrongPoints(const TrackSample& sample, const Conventions& from) {
-  const double most = std::max(kFilteredPx, kClearly * from.median_error_px);
-  return sample.MedianErrorWithPoints(from) > most &&
-         sample.MedianErrorOfMapped(from) > most;
+  return sample.MedianErrorWithPoints(from) >
+         std::max(kFilteredPx, kClearly * from.median_error_px);
 }
 
 // Smaller if simpler. Mirrored 2D points are like left-handed axes, which are
@@ -324,9 +347,11 @@ std::optional<Conventions> FindConventions(const Model& model,
         return !one.has_pose || one.cam_from_world.translation.isZero();
       });
   if (is_in_one_place) return std::nullopt;
+  auto [maps, may_be_other] = FindPixelMaps(model, geometries, context);
+  if (maps && !may_be_other) return maps;
   auto found =
       FindPoses({model, geometries, kReferencesAlone, database}, context);
-  if (!found) return std::nullopt;
+  if (!found) return maps;
   if (std::any_of(geometries.begin(), geometries.end(),
                   [](const ImageGeometry& one) { return one.sensor >= 0; })) {
     const TrackSample others(model, geometries, kOthersAtReferences, nullptr);
@@ -334,6 +359,9 @@ std::optional<Conventions> FindConventions(const Model& model,
                 ? FindSensors(others, *found, context)
                 : FindSensors({model, geometries, kOthers, database}, *found,
                               context);
+  }
+  if (maps && (found->has_wrong_points || found->NumDifferences() == 0)) {
+    return maps;
   }
   const bool differs = found->NumDifferences() > 0 || found->has_wrong_points;
   return differs ? found : std::nullopt;

@@ -196,38 +196,6 @@ double TrackSample::MedianErrorWithPoints(const Conventions& from) const {
 }
 
 // The map has the least sum of errors, by least squares that are weighted anew.
-double TrackSample::MedianErrorOfMapped(const Conventions& from) const {
-  const std::vector<Camera> cameras = Cameras(from);
-  const std::vector<RigidTransform> poses = Poses(from);
-  std::vector<Vector3d> projected;
-  std::vector<Vector2d> seen;
-  for (size_t k = 0; k < places_.size(); ++k) {
-    const Vector3d place = from.ToColmap(places_[k]);
-    for (const Sight& sight : tracks_[k]) {
-      const Camera& camera = cameras[geometries_[sight.image].camera];
-      const auto pixel = ProjectPoint(camera, poses[sight.image] * place);
-      if (!pixel) continue;
-      projected.emplace_back(pixel->homogeneous());
-      seen.push_back(from.ToColmap(sight.pixel, camera));
-    }
-  }
-  if (seen.empty()) return kInfinity;
-  Eigen::Matrix<double, 2, 3> map = Eigen::Matrix<double, 2, 3>::Identity();
-  std::vector<double> errors(seen.size());
-  for (int step = 0; step < 20; ++step) {
-    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-    Eigen::Matrix<double, 3, 2> b = Eigen::Matrix<double, 3, 2>::Zero();
-    for (size_t n = 0; n < seen.size(); ++n) {
-      errors[n] = (map * projected[n] - seen[n]).norm();
-      const double weight = 1 / std::max(errors[n], 0.1);
-      H += weight * projected[n] * projected[n].transpose();
-      b += weight * projected[n] * seen[n].transpose();
-    }
-    map = H.ldlt().solve(b).transpose();
-  }
-  return LowerMedian(std::move(errors));
-}
-
 double TrackSample::MedianPlace(const Conventions& from) const {
   const std::vector<Camera> cameras = Cameras(from);
   std::array<std::vector<double>, 2> ratios;
@@ -236,8 +204,8 @@ double TrackSample::MedianPlace(const Conventions& from) const {
       const Camera& camera = cameras[geometries_[sight.image].camera];
       const CameraModelInfo& info = *FindCameraModel(camera.model_id);
       if (!info.has_image_plane) continue;
-      const size_t center = info.param_names.substr(0, 2) == "fx" ? 2 : 1;
-      for (const size_t i : {0, 1}) {
+      const int center = info.num_focal_lengths();
+      for (const int i : {0, 1}) {
         ratios[i].push_back(sight.pixel[i] / camera.params[center + i]);
       }
     }

@@ -48,10 +48,6 @@ class TrackSample {
   // With the model's points; where there are none, where they are seen.
   double MedianErrorWithPoints(const Conventions& from) const;
 
-  // The same, where all projections are mapped affinely to where the images
-  // have them: small if the cameras are wrong, and the points are not.
-  double MedianErrorOfMapped(const Conventions& from) const;
-
   // How far the 2D points are from the upper left corner, in the median, where
   // the principal points are 1: a geometric mean of both axes.
   double MedianPlace(const Conventions& from) const;
@@ -111,5 +107,17 @@ class TrackSample {
   double largest_px_ = 0;
   std::vector<Eigen::Vector3d> places_;  // the model's points; none for matches
 };
+
+struct PixelMaps {
+  std::optional<Conventions> conventions;  // none without maps
+  // Another size or axes of all photos, or the poses of sensors in rigs, may
+  // explain them as well.
+  bool may_be_other = false;
+};
+// The maps that explain where images have the model's points, better than any
+// one move of their cameras does. O(observations).
+PixelMaps FindPixelMaps(
+    const Model& model, const std::vector<ImageGeometry>& geometries,
+    const Context& context);
 
 }  // namespace krot::internal

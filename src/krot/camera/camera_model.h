@@ -22,6 +22,12 @@ struct CameraModelInfo {
   int num_params;
   // False for EQUIRECTANGULAR, which has no image plane z = 1.
   bool has_image_plane;
+
+  // Of its first parameters; the principal point's two follow. For models with
+  // an image plane.
+  int num_focal_lengths() const {
+    return param_names.substr(0, 2) == "fx" ? 2 : 1;
+  }
 };
 
 // All models, in the order of their ids, which run from 0 without gaps.

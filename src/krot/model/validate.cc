@@ -257,8 +257,7 @@ void CheckCamera(const Camera& camera) {
 // project to one pixel.
 void CheckFocalLength(const Camera& camera) {
   const CameraModelInfo& info = *FindCameraModel(camera.model_id);
-  const bool has_two = info.param_names.substr(0, 2) == "fx" ||
-                       info.param_names.substr(0, 1) == "w";
+  const bool has_two = !info.has_image_plane || info.num_focal_lengths() == 2;
   if (camera.params[0] != 0 && (!has_two || camera.params[1] != 0)) return;
   Fail("camera ", camera.id, ": found 0 for ",
        info.param_names.substr(0, info.param_names.find(", c")), " of ",

@@ -127,8 +127,7 @@ std::string NextSteps(const CheckReport& report) {
       (is_converted ||
        (check.is_adjusted && check.fits && check.IsAnythingWrong()))) {
     text +=
-        (is_converted ? "  The model in COLMAP's conventions, without what is "
-                        "wrong:\n"
+        (is_converted ? "  The model put right, without what is wrong:\n"
                       : "  The model without what is wrong:\n") +
         ("    krot model_checker --input_path " + input) +
         (report.database_path.empty() ? "" : " --database_path " + database) +

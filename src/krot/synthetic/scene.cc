@@ -100,7 +100,7 @@ Camera DefaultCamera(int model_id, uint64_t width, uint64_t height,
     return camera;
   }
   camera.params = {focal_length};
-  if (info->param_names.substr(0, 2) == "fx") {
+  if (info->num_focal_lengths() == 2) {
     camera.params.push_back(1.01 * focal_length);
   }
   camera.params.push_back(static_cast<double>(width) / 2);

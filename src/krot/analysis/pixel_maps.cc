@@ -1,0 +1,361 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "krot/analysis/noise.h"
+#include "krot/analysis/track_sample.h"
+#include "krot/base/numbers.h"
+#include "krot/camera/camera_model.h"
+#include "krot/check.h"
+#include "krot/geometry.h"
+#include "krot/model.h"
+#include "krot/model/rigs.h"
+
+namespace krot::internal {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+using Matrix23 = Eigen::Matrix<double, 2, 3>;
+
+constexpr size_t kFewestSights = 10;  // of an image that is asked
+constexpr int64_t kMostSights = 100;  // of an image, evenly spread
+constexpr size_t kFewestImages = 3;   // fewer agree by chance
+// Of the photo's size: others are not so much smaller, and a principal point is
+// farther from the edges.
+constexpr double kLeastShare = 0.1;
+constexpr int kMostInVain = 100;  // images whose map explains no others
+
+const Matrix23 kAsRead = Matrix23::Identity();
+
+struct Sight {
+  const Camera* camera;
+  Vector3d x_cam;
+  Vector2d projected, pixel;
+};
+using Sights = std::vector<Sight>;
+
+// By image; none of images with too few.
+std::vector<Sights> SightsOfImages(
+    const Model& model, const std::vector<ImageGeometry>& geometries) {
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
+  std::vector<int64_t> num(model.images.size(), 0);
+  for (const int32_t n : image_of) ++num[n];
+  std::vector<int64_t> passed(model.images.size(), 0);
+  std::vector<Sights> sights(model.images.size());
+  for (const Point3D& point : model.points3D) {
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const int32_t n = image_of[e];
+      const ImageGeometry& geometry = geometries[n];
+      if (!geometry.has_pose || passed[n]++ % (num[n] / kMostSights + 1) != 0) {
+        continue;
+      }
+      const Camera& camera = model.cameras[geometry.camera];
+      const Vector3d x_cam = geometry.cam_from_world * point.xyz;
+      const auto projected = ProjectPoint(camera, x_cam);
+      const Point2D& pixel =
+          model.images[n].points2D[model.track_elements[e].point2D_idx];
+      if (!projected || !std::isfinite(pixel.x + pixel.y)) continue;
+      sights[n].push_back({&camera, x_cam, *projected, {pixel.x, pixel.y}});
+    }
+  }
+  for (Sights& own : sights) {
+    if (own.size() < kFewestSights) own.clear();
+  }
+  return sights;
+}
+
+Vector2d ErrorAt(const Matrix23& map, const Sight& sight) {
+  return map * sight.projected.homogeneous() - sight.pixel;
+}
+
+// In pixels of the camera.
+double ErrorOf(const Matrix23& map, const Sight& sight) {
+  const Vector2d scale = map.leftCols<2>().rowwise().norm();
+  return ErrorAt(map, sight).cwiseQuotient(scale).norm();
+}
+
+template <typename ErrorOfSight>
+double MedianError(const Sights& sights, const ErrorOfSight& error_of) {
+  std::vector<double> errors;
+  errors.reserve(sights.size());
+  for (const Sight& sight : sights) errors.push_back(error_of(sight));
+  return LowerMedian(std::move(errors));
+}
+
+double MedianError(const Sights& sights, const Matrix23& map) {
+  return MedianError(sights,
+                     [&](const Sight& sight) { return ErrorOf(map, sight); });
+}
+
+// The rows and columns that fit in 6, without allocation.
+using SmallMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
+
+// The typical distance of a pixel from the origin, relative to the projected.
+double SizeOf(const Sights& sights) {
+  std::vector<double> seen, projected;
+  for (const Sight& sight : sights) {
+    seen.push_back(sight.pixel.norm());
+    projected.push_back(sight.projected.norm());
+  }
+  return LowerMedian(std::move(seen)) / LowerMedian(std::move(projected));
+}
+
+// The x = x0 + P y with the least sum of distances |J x - r|, where rows_of
+// gives (J, r) of a sight: least squares with weights anew.
+template <typename RowsOf>
+SmallVector LeastDistances(const Sights& sights, const SmallVector& x0,
+                           const SmallMatrix& P, const RowsOf& rows_of) {
+  const double least = 0.1 * SizeOf(sights);
+  SmallVector x = x0;
+  for (int step = 0; step < 20; ++step) {
+    SmallMatrix H = SmallMatrix::Zero(P.cols(), P.cols());
+    SmallVector g = SmallVector::Zero(P.cols());
+    for (const Sight& sight : sights) {
+      const auto [J, r] = rows_of(sight);
+      const double weight = 1 / std::max((J * x - r).norm(), least);
+      const SmallMatrix A = J * P;
+      H += weight * A.transpose() * A;
+      g += weight * A.transpose() * (r - J * x0);
+    }
+    x = x0 + P * H.ldlt().solve(g);
+  }
+  return x;
+}
+
+using Rows = std::pair<SmallMatrix, Vector2d>;
+
+// The affine map, row by row.
+Matrix23 AffineMap(const Sights& sights) {
+  SmallVector identity(6);
+  identity << 1, 0, 0, 0, 1, 0;
+  const SmallVector x = LeastDistances(
+      sights, identity, SmallMatrix::Identity(6, 6), [](const Sight& sight) {
+        SmallMatrix J = SmallMatrix::Zero(2, 6);
+        J.block<1, 3>(0, 0) = sight.projected.homogeneous().transpose();
+        J.block<1, 3>(1, 3) = sight.projected.homogeneous().transpose();
+        return Rows(J, sight.pixel);
+      });
+  Matrix23 map;
+  map << x.head<3>().transpose(), x.tail<3>().transpose();
+  return map;
+}
+
+// The simplest map along the photo's axes that leaves hardly more than the most
+// general one: a shift; a scale, or one for each axis; or both.
+Matrix23 FitMap(const Sights& sights) {
+  const Matrix23 affine = AffineMap(sights);
+  // The axes that the map takes to the image's.
+  Matrix2d axes = Matrix2d::Zero();
+  const Matrix2d size = affine.leftCols<2>().cwiseAbs();
+  const bool is_exchanged = size(0, 0) * size(1, 1) < size(0, 1) * size(1, 0);
+  for (const int i : {0, 1}) {
+    const int j = is_exchanged ? 1 - i : i;
+    axes(i, j) = affine(i, j) < 0 ? -1 : 1;
+  }
+  const auto fit = [&](const SmallVector& x0, const SmallMatrix& P) {
+    const SmallVector x =
+        LeastDistances(sights, x0, P, [&](const Sight& sight) {
+          const Vector2d turned = axes * sight.projected;
+          SmallMatrix J = SmallMatrix::Zero(2, 4);
+          J.leftCols<2>() = turned.asDiagonal();
+          J.rightCols<2>() = Matrix2d::Identity();
+          return Rows(J, sight.pixel);
+        });
+    Matrix23 map;
+    map << x.head<2>().asDiagonal() * axes, x.tail<2>();
+    return map;
+  };
+  const Vector4d same(1, 1, 0, 0);
+  const SmallMatrix all = SmallMatrix::Identity(4, 4);
+  SmallMatrix scale_and_shift(4, 3);
+  scale_and_shift << same, all.rightCols<2>();
+  const SmallVector zero = SmallVector::Zero(4);
+  const Matrix23 general = fit(zero, all);
+  const double most = 1.05 * MedianError(sights, general);
+  for (const Matrix23& map :
+       {fit(same, all.rightCols<2>()), fit(zero, same),
+        fit(zero, all.leftCols<2>()), fit(zero, scale_and_shift)}) {
+    if (MedianError(sights, map) <= most) return map;
+  }
+  return general;
+}
+
+// Whether the map explains the pixels better than a turn and a move of the
+// cameras, all alike in their own axes.
+bool IsNoMove(const Matrix23& map, Sights sights) {
+  const double mapped = MedianError(
+      sights, [&](const Sight& sight) { return ErrorAt(map, sight).norm(); });
+  for (int step = 0; step < 5; ++step) {
+    const SmallVector move = LeastDistances(
+        sights, SmallVector::Zero(6), SmallMatrix::Identity(6, 6),
+        [](const Sight& sight) {
+          // By x_cam, for a step at which pixels hardly bend.
+          const double h = 1e-5 * sight.x_cam.norm();
+          SmallMatrix by_point = SmallMatrix::Zero(2, 3);
+          for (const int i : {0, 1, 2}) {
+            const auto moved = ProjectPoint(
+                *sight.camera, sight.x_cam + h * Vector3d::Unit(i));
+            if (moved) by_point.col(i) = (*moved - sight.projected) / h;
+          }
+          SmallMatrix J(2, 6);
+          J << -by_point * CrossMatrix(sight.x_cam), by_point;
+          return Rows(J, sight.pixel - sight.projected);
+        });
+    const Vector3d axis = move.head<3>().stableNormalized();
+    const Eigen::Matrix3d turn =
+        Eigen::AngleAxisd(move.head<3>().norm(), axis).toRotationMatrix();
+    for (Sight& sight : sights) {
+      sight.x_cam = turn * sight.x_cam + move.tail<3>();
+      const auto projected = ProjectPoint(*sight.camera, sight.x_cam);
+      if (projected) sight.projected = *projected;
+    }
+  }
+  return mapped <
+         MedianError(
+             sights,
+             [](const Sight& sight) { return ErrorAt(kAsRead, sight).norm(); });
+}
+
+Sights SightsOf(const std::vector<Sights>& all,
+                const std::vector<int32_t>& images) {
+  Sights joined;
+  for (const int32_t n : images) {
+    joined.insert(joined.end(), all[n].begin(), all[n].end());
+  }
+  return joined;
+}
+
+// The cameras of the images as the map has them; empty if others of their
+// images are asked, or if no camera has such pixels: with other axes,
+// normalised, from the middle of the photo, or with two scales for one focal
+// length.
+std::vector<Camera> MappedCameras(const Model& model,
+                                  const std::vector<ImageGeometry>& geometries,
+                                  const std::vector<Sights>& sights,
+                                  const PixelMap& map) {
+  const Vector2d scale = map.image_from_camera.leftCols<2>().diagonal();
+  if (!(scale.minCoeff() > kLeastShare)) return {};
+  std::set<int32_t> cameras;
+  for (const int32_t n : map.images) cameras.insert(geometries[n].camera);
+  for (size_t n = 0; n < sights.size(); ++n) {
+    const bool is_mapped = std::binary_search(
+        map.images.begin(), map.images.end(), static_cast<int32_t>(n));
+    if (!is_mapped && !sights[n].empty() &&
+        cameras.count(geometries[n].camera) > 0) {
+      return {};
+    }
+  }
+  const bool is_resized = map.image_from_camera.col(2).isZero();
+  std::vector<Camera> mapped;
+  for (const int32_t c : cameras) {
+    Camera& camera = mapped.emplace_back(model.cameras[c]);
+    const CameraModelInfo& info = *FindCameraModel(camera.model_id);
+    const int center = info.num_focal_lengths();
+    if (!info.has_image_plane || (center == 1 && scale[0] != scale[1])) {
+      return {};
+    }
+    const std::array<uint64_t*, 2> size = {&camera.width, &camera.height};
+    for (const int i : {0, 1}) {
+      if (is_resized)
+        *size[i] = std::llround(scale[i] * static_cast<double>(*size[i]));
+      if (i < center) camera.params[i] *= scale[i];
+      double& principal = camera.params[center + i];
+      principal = scale[i] * principal + map.image_from_camera(i, 2);
+      const double share = principal / static_cast<double>(*size[i]);
+      if (!(std::min(share, 1 - share) > kLeastShare)) return {};
+    }
+  }
+  return mapped;
+}
+
+}  // namespace
+
+PixelMaps FindPixelMaps(const Model& model,
+                        const std::vector<ImageGeometry>& geometries,
+                        const Context& context) {
+  const std::vector<Sights> sights = SightsOfImages(model, geometries);
+  std::vector<double> errors(sights.size(), 0);  // as read
+  std::vector<int32_t> asked;
+  size_t num_images = 0;
+  for (size_t n = 0; n < sights.size(); ++n) {
+    if (sights[n].empty()) continue;
+    ++num_images;
+    errors[n] = MedianError(sights[n], kAsRead);
+    if (errors[n] > kFilteredPx) asked.push_back(static_cast<int32_t>(n));
+  }
+  // The asked images that a map explains, hardly less well than their own map.
+  std::vector<double> own_errors(sights.size(), -1);
+  const auto explained = [&](const Matrix23& map) {
+    std::vector<int32_t> images;
+    for (const int32_t n : asked) {
+      const double mapped = MedianError(sights[n], map);
+      if (mapped > std::min(kFilteredPx, errors[n] / 4)) continue;
+      double& own = own_errors[n];
+      if (own < 0) own = MedianError(sights[n], FitMap(sights[n]));
+      if (mapped <= std::max(0.1, 1.5 * own)) images.push_back(n);
+    }
+    return images;
+  };
+  Conventions found;
+  std::vector<double> before, after;
+  int num_in_vain = 0;
+  while (!asked.empty() && num_in_vain < kMostInVain &&
+         !context.IsCancelled()) {
+    PixelMap one;
+    one.images = {asked.front()};
+    for (const bool is_of_all : {false, true}) {
+      if (is_of_all && one.images.size() < kFewestImages) break;
+      one.image_from_camera = FitMap(SightsOf(sights, one.images));
+      one.images = explained(one.image_from_camera);
+    }
+    const Sights own = SightsOf(sights, one.images);
+    if (one.images.size() < kFewestImages ||
+        !IsNoMove(one.image_from_camera, own)) {
+      ++num_in_vain;
+      asked.erase(asked.begin());
+      continue;
+    }
+    for (const Sight& sight : own) {
+      before.push_back(ErrorOf(kAsRead, sight));
+      after.push_back(ErrorOf(one.image_from_camera, sight));
+    }
+    const std::vector<int32_t> left = std::move(asked);
+    asked.clear();
+    std::set_difference(left.begin(), left.end(), one.images.begin(),
+                        one.images.end(), std::back_inserter(asked));
+    one.cameras = MappedCameras(model, geometries, sights, one);
+    for (const int32_t n : one.images) {
+      one.image_names.push_back(model.images[n].name);
+    }
+    found.pixel_maps.push_back(std::move(one));
+  }
+  if (found.pixel_maps.empty()) return {};
+  found.median_error_as_read_px = LowerMedian(std::move(before));
+  found.median_error_px = LowerMedian(std::move(after));
+  const PixelMap& first = found.pixel_maps.front();
+  const auto is_of_sensor = [&](int32_t n) {
+    return geometries[n].sensor >= 0;
+  };
+  const bool is_of_all =
+      first.images.size() == num_images &&
+      !(first.image_from_camera - kAsRead).leftCols<2>().isZero(0.25);
+  return {found, is_of_all || std::any_of(first.images.begin(),
+                                          first.images.end(), is_of_sensor)};
+}
+
+}  // namespace krot::internal

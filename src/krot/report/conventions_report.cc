@@ -1,0 +1,212 @@
+#include "krot/report/reports.h"
+
+#include <cctype>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/camera/camera_model.h"
+#include "krot/report/report_json.h"
+
+namespace krot::internal {
+
+namespace {
+
+// For example "x right, y down, z forward".
+std::string AxesWords(const Eigen::MatrixXd& axes) {
+  constexpr const char* kDirections[] = {"left", "right",    "up",
+                                         "down", "backward", "forward"};
+  std::vector<std::string> words;
+  for (int j = 0; j < axes.cols(); ++j) {
+    Eigen::Index i = 0;
+    axes.col(j).cwiseAbs().maxCoeff(&i);
+    words.push_back(std::string(1, "xyz"[j]) + " " +
+                    kDirections[2 * i + (axes(i, j) > 0 ? 1 : 0)]);
+  }
+  return ListText(words);
+}
+
+std::string CameraAxesWords(const PoseConventions& conventions) {
+  Eigen::Matrix3d axes = conventions.cam_from_file_axes;
+  if (conventions.is_left_handed) axes.col(1) = -axes.col(1);
+  return AxesWords(axes);
+}
+
+std::string PixelAxesWords(const Conventions& conventions) {
+  return AxesWords(conventions.pixel_from_file_axes);
+}
+
+// For example "poses from camera to world".
+std::vector<std::string> PoseWords(const PoseConventions& one,
+                                   const std::string& world) {
+  std::vector<std::string> words;
+  if (one.has_w_last) words.push_back("quaternions with w last (x, y, z, w)");
+  if (one.is_world_from_cam) {
+    words.push_back((one.has_centers ? "poses" : "rotations") +
+                    (" from camera to " + world));
+  } else if (one.has_centers) {
+    words.push_back("camera centres in place of translations");
+  }
+  if (one.is_left_handed || !one.cam_from_file_axes.isIdentity()) {
+    words.push_back(std::string(one.is_left_handed ? "left-handed " : "") +
+                    "camera axes (" + CameraAxesWords(one) + ")");
+  }
+  return words;
+}
+
+// What differs from COLMAP's conventions.
+std::string ConventionWords(const Conventions& one) {
+  std::vector<std::string> words = PoseWords(one.poses, "world");
+  std::vector<std::string> of_sensors = PoseWords(one.sensors, "rig");
+  if (one.rig_factor != 1) {
+    of_sensors.push_back("translations that must be multiplied by " +
+                         FormatNumber(one.rig_factor, 6));
+  }
+  if (!of_sensors.empty()) {
+    words.push_back("sensors in rigs with " + ListText(std::move(of_sensors)));
+  }
+  if (one.intrinsics_factor != 1) {
+    const bool is_larger = one.intrinsics_factor < 1;
+    words.push_back(
+        "intrinsics for photos " +
+        FormatNumber(
+            is_larger ? 1 / one.intrinsics_factor : one.intrinsics_factor, 0) +
+        (is_larger ? " times as large" : " times smaller"));
+  }
+  if (one.has_central_principal_point) {
+    words.push_back("principal points far from the middle of the photos");
+  }
+  if (!one.pixel_from_file_axes.isIdentity()) {
+    words.push_back("2D points with other axes (" + PixelAxesWords(one) + ")");
+  }
+  if (one.has_wrong_points) {
+    words.push_back("3D points that are not where the images see them");
+  }
+  return ListText(std::move(words));
+}
+
+// For example "its 50 images ask for the principal point (540.2, 959.8)".
+std::string CameraWords(const PixelMap& map) {
+  const Camera& camera = map.cameras.front();
+  const auto center = static_cast<size_t>(
+      FindCameraModel(camera.model_id)->num_focal_lengths());
+  const auto pair = [&](size_t i) {
+    return FormatNumber(camera.params[i], 1) + ", " +
+           FormatNumber(camera.params[i + 1], 1);
+  };
+  const bool is_one = map.cameras.size() == 1;
+  const Eigen::Vector2d scale = map.image_from_camera.leftCols<2>().diagonal();
+  const Eigen::Vector2d center_now(camera.params[center],
+                                   camera.params[center + 1]);
+  const Eigen::Vector2d center_as_read =
+      (center_now - map.image_from_camera.col(2)).cwiseQuotient(scale);
+  std::string asked;
+  if (scale != Eigen::Vector2d::Ones()) {
+    asked = center == 1
+                ? "a focal length of " + Pixels(camera.params.front(), 1)
+                : "focal lengths of (" + pair(0) + ") px";
+  }
+  if ((center_now - center_as_read).norm() > 1 || asked.empty()) {
+    asked += TextIf(!asked.empty(), " and ") + "the principal point (" +
+             pair(center) + ") px";
+  }
+  return (is_one ? "camera " + std::to_string(camera.id) + " is wrong: its "
+                 : Counted(map.cameras.size(), "camera") +
+                       " are wrong, first of all camera " +
+                       std::to_string(camera.id) + ": their ") +
+         Counted(map.images.size(), "image") + " ask for " + asked +
+         TextIf(!is_one, " there");
+}
+
+// For example "the 2D points of 25 images (a.jpg, ...) are not those of their
+// photos, but 0.5 times as large".
+std::string PixelWords(const PixelMap& map) {
+  const Eigen::Matrix2d A = map.image_from_camera.leftCols<2>();
+  const Eigen::Vector2d scale = A.rowwise().norm();
+  const Eigen::Matrix2d axes = scale.cwiseInverse().asDiagonal() * A;
+  std::vector<std::string> differences;
+  if (!axes.isIdentity()) {
+    differences.push_back("with other axes (" + AxesWords(axes.transpose()) +
+                          ")");
+  }
+  if (scale[0] != scale[1]) {
+    differences.push_back(FormatLength(scale[0]) + " times as wide and " +
+                          FormatLength(scale[1]) + " times as high");
+  } else if (scale[0] != 1) {
+    differences.push_back(FormatLength(scale[0]) + " times as large");
+  }
+  const Eigen::Vector2d shift = map.image_from_camera.col(2);
+  if (axes.isIdentity() && !shift.isZero()) {
+    differences.push_back("moved by (" + FormatNumber(shift.x(), 1) + ", " +
+                          FormatNumber(shift.y(), 1) + ") px");
+  }
+  return "the 2D points of " + Counted(map.images.size(), "image") + " (" +
+         map.image_names.front() +
+         ", ...) are not those of their photos, but " +
+         ListText(std::move(differences));
+}
+
+std::string MapsWords(const Conventions& one) {
+  std::string text;
+  for (const PixelMap& map : one.pixel_maps) {
+    text += TextIf(!text.empty(), "; and ") +
+            (map.cameras.empty() ? PixelWords(map) : CameraWords(map));
+  }
+  return text;
+}
+
+Json MapJson(const PixelMap& map) {
+  const auto camera_json = [](const Camera& camera) {
+    return Json{{"camera_id", camera.id}, {"params", camera.params}};
+  };
+  const auto row = [&](int i) {
+    return VectorJson(map.image_from_camera.row(i).transpose());
+  };
+  return {{"images", map.image_names},
+          {"cameras", ListJson(map.cameras, camera_json)},
+          {"image_from_camera", {row(0), row(1)}}};
+}
+
+Json PoseJson(const PoseConventions& one) {
+  Json json = KROT_JSON_OF(one, has_w_last, is_world_from_cam, has_centers,
+                           is_left_handed);
+  json["camera_axes"] = CameraAxesWords(one);
+  return json;
+}
+
+}  // namespace
+
+std::string ConventionsSentence(const Conventions& one) {
+  const std::string falls = " median error falls from " +
+                            FormatNumber(one.median_error_as_read_px, 2) +
+                            " to " + Pixels(one.median_error_px, 2) + ".";
+  if (!one.pixel_maps.empty()) {
+    std::string maps = MapsWords(one);
+    maps[0] = static_cast<char>(std::toupper(maps[0]));
+    return maps + ". Put right, their" + falls;
+  }
+  const bool is_read_otherwise = one.NumDifferences() > 0;
+  return (is_read_otherwise
+              ? "The model is not in COLMAP's conventions, but has "
+              : "The model has ") +
+         ConventionWords(one) +
+         (is_read_otherwise ? ": converted, its" : ": with others, the") +
+         falls;
+}
+
+nlohmann::ordered_json ConventionsJson(const Conventions& one) {
+  Json json = {{"words", one.pixel_maps.empty() ? ConventionWords(one)
+                                                : MapsWords(one)}};
+  json.update(PoseJson(one.poses));
+  json["sensors"] = PoseJson(one.sensors);
+  json["pixel_axes"] = PixelAxesWords(one);
+  json["pixel_maps"] = ListJson(one.pixel_maps, MapJson);
+  json.update(KROT_JSON_OF(one, rig_factor, intrinsics_factor,
+                           has_central_principal_point, has_wrong_points,
+                           median_error_as_read_px, median_error_px));
+  return json;
+}
+
+}  // namespace krot::internal
