@@ -240,16 +240,19 @@ void Add(const Eigen::Matrix<double, N, 6>& F,
   const Eigen::Matrix<double, N, 3> B = A * root;
   const Square R =
       Square::Identity(B.rows(), B.rows()) - Square(B * B.transpose());
-  Eigen::SelfAdjointEigenSolver<Square> of_R;
-  if constexpr (N == 2) {
-    of_R.computeDirect(R);
-  } else {
-    of_R.compute(R);
-  }
+  const auto [values, vectors] = [&R] {
+    if constexpr (N == 2) {
+      Eigen::SelfAdjointEigenSolver<Square> of_R;
+      of_R.computeDirect(R);
+      return std::pair(of_R.eigenvalues(), of_R.eigenvectors());
+    } else {
+      return EigenpairsOf(R);
+    }
+  }();
   for (Index j = 0; j < R.rows(); ++j) {
-    const double r = of_R.eigenvalues()[j];
+    const double r = values[j];
     if (r < kControlled) continue;
-    const Eigen::Matrix<double, N, 1> direction = of_R.eigenvectors().col(j);
+    const Eigen::Matrix<double, N, 1> direction = vectors.col(j);
     const Vector6 f = F.transpose() * direction;
     const double along = direction.dot(error);
     sums->M.noalias() += r * f * f.transpose();
