@@ -126,11 +126,13 @@ struct PoseConventions {
 // One map along the photo's axes that takes the pixels at which cameras see the
 // model's points to where some images have them.
 struct PixelMap {
-  std::vector<int32_t> images;  // three and more, in Model::images, ascending
+  std::vector<int32_t> images;  // in Model::images, ascending
+
   std::vector<std::string> image_names;
-  // Their cameras with the intrinsics that all of their images ask for. Empty if
-  // other images of these cameras fit, or no intrinsics explain the map: then
-  // the 2D points are those of other photos.
+  // Their cameras with the intrinsics that their images ask for. Empty if other
+  // images of these cameras fit, or no intrinsics explain the map: then the 2D
+  // points are those of other photos.
+
   std::vector<Camera> cameras;
   // The image's pixel of a camera's (x, y, 1).
   Eigen::Matrix<double, 2, 3> image_from_camera;
@@ -163,7 +165,8 @@ struct Conventions {
   // Median reprojection errors of a sample of the model's tracks, pixels: as it
   // stands, and so converted, with points where their images see them. No error
   // counts more than the size of the photo. If only the sensors of rigs are
-  // written otherwise, or some pixels mapped, these are the errors in their images.
+  // written otherwise, or some pixels mapped, these are the errors in their
+  // images.
   double median_error_as_read_px = 0;
   double median_error_px = 0;
 

@@ -306,6 +306,24 @@ TEST(FindConventions, FindsIntrinsicsThatAllImagesAskFor) {
   }
 }
 
+TEST(FindConventions, FindsTheFocalLengthThatOneImageAsksFor) {
+  Model model = SynthesizeScene(SceneOf(12, 400, 4, 0.3, 4)).model;
+  Camera other = model.cameras[0];
+  const double focal_length = other.params[0];
+  other.id = 2;
+  other.params[0] *= 1.3;
+  model.cameras.push_back(other);
+  model.images[3].camera_id = 2;
+  UseTrivialRigs(&model);
+  const auto found = FindConventions(model);
+  ASSERT_TRUE(found);
+  ASSERT_EQ(found->pixel_maps.size(), 1);
+  EXPECT_EQ(found->pixel_maps[0].images, std::vector<int32_t>{3});
+  const Model converted = ConvertModel(model, *found);
+  EXPECT_NEAR(converted.cameras[1].params[0], focal_length,
+              1e-3 * focal_length);
+}
+
 // Half of the images, or all: 2D points of photos of half the size, turned by
 // 90 degrees, mirrored, cropped, normalised, or from the middle of the photo.
 TEST(FindConventions, Finds2DPointsOfOtherPhotos) {

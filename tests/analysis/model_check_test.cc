@@ -183,8 +183,12 @@ TEST(CheckModel, BlamesTheFocalLengthThatStandsOut) {
     ValidateModel(model);
     EXPECT_THAT(Images(CheckModel(model), ImageVerdict::kWrong), IsEmpty());
     const double focal_length = model.cameras[0].params[0];
+    // Turned as well, or the lens alone would be put right.
+    const Eigen::AngleAxisd turn(0.1, Eigen::Vector3d::UnitY());
     for (const size_t n : {3, 7}) {
       model.cameras[n].params[0] *= 1.3;
+      Pose& pose = model.frames[n].rig_from_world;
+      pose = ToPose({turn * pose.Rotation(), turn * pose.translation});
     }
     const ModelCheck check = CheckModel(model);
     EXPECT_THAT(Images(check, ImageVerdict::kWrong),

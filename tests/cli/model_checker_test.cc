@@ -142,7 +142,7 @@ TEST_F(ModelCheckerCommand, NamesWhatIsWrongAndWritesTheModelWithout) {
   const KrotResult result = Succeeded(
       Check("faulty", {"--output_path", folder_ / "cured", "--report_path",
                        folder_ / "r.json", "--html_path", folder_ / "r.html"}));
-  EXPECT_THAT(result.out, StartsWith("1 of 8 images and 1 of "));
+  EXPECT_THAT(result.out, StartsWith("1 of 8 images ("));
   EXPECT_THAT(result.out, HasSubstr("colmap image_registrator"));
   const Json report = ReadJson(folder_ / "r.json");
   EXPECT_TRUE(report["is_anything_wrong"]);
@@ -153,6 +153,35 @@ TEST_F(ModelCheckerCommand, NamesWhatIsWrongAndWritesTheModelWithout) {
   ValidateModel(cured);
   EXPECT_EQ(cured.images.size(), 7u);
   Succeeded(Check("cured", {"--fail_on", "wrong"}));
+}
+
+TEST_F(ModelCheckerCommand, JudgesNoImageWithoutAPose) {
+  Model model = Load(folder_ / "sound");
+  Image& image = model.images.emplace_back();
+  image.id = 99;
+  image.camera_id = model.cameras[0].id;
+  image.name = "unregistered.jpg";
+  image.cam_from_world.translation.setConstant(NAN);
+  UseTrivialRigs(&model);
+  Save(model, folder_ / "more");
+  const KrotResult result = Succeeded(Check(
+      "more", {"--fail_on", "wrong", "--report_path", folder_ / "r.json"}));
+  EXPECT_THAT(result.out, StartsWith("Nothing is wrong: all "));
+  const Json checked = ReadJson(folder_ / "r.json")["images"].back();
+  EXPECT_EQ(checked["image_name"], "unregistered.jpg");
+  EXPECT_EQ(checked["verdict"], "fine");
+  EXPECT_EQ(checked["center_sigma"], nullptr);
+}
+
+TEST_F(ModelCheckerCommand, RefusesAModelWhoseWriterHadNo2DPoints) {
+  Model model = Load(folder_ / "sound");
+  for (Image& image : model.images) {
+    for (Point2D& point : image.points2D) point.x = point.y = 0;
+  }
+  Save(model, folder_ / "empty");
+  const KrotResult result = Check("empty");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("in each image all 2D points are at one "));
 }
 
 // The tails of the sample's errors are heavier than Gaussian ones.

@@ -267,6 +267,23 @@ void WarnOfDegeneration(const Model& input, const Model& written,
   }
 }
 
+namespace {
+
+// Files whose writer had no 2D points: anything fits such observations.
+bool HasPixels(const Model& model) {
+  bool has_several = false;
+  for (const Image& image : model.images) {
+    has_several |= image.points2D.size() > 1;
+    for (const Point2D& point : image.points2D) {
+      const Point2D& first = image.points2D.front();
+      if (point.x != first.x || point.y != first.y) return true;
+    }
+  }
+  return !has_several;
+}
+
+}  // namespace
+
 Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
                 bool needs_observations) {
   const Timer timer;
@@ -276,6 +293,12 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
   if (needs_observations && read.model.track_elements.empty()) {
     throw CommandError(kExitNothingToSolve,
                        std::string("nothing to solve: ") + kNoObservations);
+  }
+  if (needs_observations && !HasPixels(read.model)) {
+    throw CommandError(
+        kExitNothingToSolve,
+        "nothing to solve: in each image all 2D points are at one "
+        "place; take the model that COLMAP wrote");
   }
   run->poses = read.poses;
   if (!paths.rotations_path.empty()) {

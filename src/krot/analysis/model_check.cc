@@ -38,6 +38,9 @@ class Checker {
       image.others_focal_length_px = odd[n] ? odd[n]->others : 0;
     }
     for (const int32_t n : image_of_) ++check_.images[n].num_observations;
+    for (const ImageGeometry& geometry : ImageGeometries(model)) {
+      has_pose_.push_back(geometry.has_pose);
+    }
   }
 
   ModelCheck Run() {
@@ -202,7 +205,7 @@ class Checker {
     int32_t weakest = -1;
     for (int32_t n = 0; n < static_cast<int32_t>(sums_.size()); ++n) {
       const ImageCheck& image = check_.images[n];
-      if (IsWrong(n) ||
+      if (IsWrong(n) || !has_pose_[n] ||
           (check_.pairs && check_.pairs->images[n].kept_matches > 0) ||
           sums_[n].CenterSpread() <= kWeaklyHeld * spread) {
         continue;
@@ -355,16 +358,17 @@ class Checker {
       image.center_sigma = *check_.sigma_px * sums_[n].CenterSpread();
       image.turn_sigma_deg =
           kDegreesPerRadian * *check_.sigma_px * sums_[n].TurnSpread();
-      sigmas.push_back(image.center_sigma);
+      if (has_pose_[n]) sigmas.push_back(image.center_sigma);
     }
     if (sigmas.size() <= 2) return;  // two images: their distance is the unit
     const double median = LowerMedian(std::move(sigmas));
-    for (ImageCheck& image : check_.images) {
-      if (image.verdict == ImageVerdict::kWrong) continue;
+    for (size_t n = 0; n < sums_.size(); ++n) {
+      ImageCheck& image = check_.images[n];
+      if (IsWrong(static_cast<int32_t>(n))) continue;
       image.relative_center_sigma = std::isfinite(image.center_sigma)
                                         ? image.center_sigma / median
                                         : kInfinity;
-      if (!(image.relative_center_sigma <= kWeaklyHeld)) {
+      if (has_pose_[n] && !(image.relative_center_sigma <= kWeaklyHeld)) {
         image.verdict = ImageVerdict::kWeaklyHeld;
       }
     }
@@ -374,6 +378,7 @@ class Checker {
   const ModelCheckOptions& options_;
   const Context& context_;
   const std::vector<int32_t> image_of_;  // by track element
+  std::vector<char> has_pose_;           // by image; others are not judged
   // By image, in the model as it stands.
   const std::vector<ErrorsInDisc> in_disc_;
   NoiseOptions noise_options_;

@@ -32,7 +32,7 @@ using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
 constexpr size_t kFewestSights = 10;  // of an image that is asked
 constexpr int64_t kMostSights = 100;  // of an image, evenly spread
-constexpr size_t kFewestImages = 3;   // fewer agree by chance
+constexpr size_t kFewImages = 3;
 // Of the photo's size: others are not so much smaller, and a principal point is
 // farther from the edges.
 constexpr double kLeastShare = 0.1;
@@ -186,7 +186,7 @@ Matrix23 FitMap(const Sights& sights) {
   scale_and_shift << same, all.rightCols<2>();
   const SmallVector zero = SmallVector::Zero(4);
   const Matrix23 general = fit(zero, all);
-  const double most = 1.05 * MedianError(sights, general);
+  const double most = 1.1 * MedianError(sights, general);
   for (const Matrix23& map :
        {fit(same, all.rightCols<2>()), fit(zero, same),
         fit(zero, all.leftCols<2>()), fit(zero, scale_and_shift)}) {
@@ -196,8 +196,8 @@ Matrix23 FitMap(const Sights& sights) {
 }
 
 // Whether the map explains the pixels better than a turn and a move of the
-// cameras, all alike in their own axes.
-bool IsNoMove(const Matrix23& map, Sights sights) {
+// cameras, all alike in their own axes, by this factor.
+bool IsNoMove(const Matrix23& map, Sights sights, double factor) {
   const double mapped = MedianError(
       sights, [&](const Sight& sight) { return ErrorAt(map, sight).norm(); });
   for (int step = 0; step < 5; ++step) {
@@ -225,10 +225,10 @@ bool IsNoMove(const Matrix23& map, Sights sights) {
       if (projected) sight.projected = *projected;
     }
   }
-  return mapped <
-         MedianError(
-             sights,
-             [](const Sight& sight) { return ErrorAt(kAsRead, sight).norm(); });
+  const double moved = MedianError(sights, [](const Sight& sight) {
+    return ErrorAt(kAsRead, sight).norm();
+  });
+  return factor * mapped < moved;
 }
 
 Sights SightsOf(const std::vector<Sights>& all,
@@ -240,26 +240,31 @@ Sights SightsOf(const std::vector<Sights>& all,
   return joined;
 }
 
-// The cameras of the images as the map has them; empty if others of their
-// images are asked, or if no camera has such pixels: with other axes,
-// normalised, from the middle of the photo, or with two scales for one focal
-// length.
+// The cameras of the images as the map has them. Empty if an image of theirs
+// fits as read or most fit in no way, or if no camera has such pixels: with
+// other axes, normalised, from the middle of the photo, or with two scales for
+// one focal length.
 std::vector<Camera> MappedCameras(const Model& model,
                                   const std::vector<ImageGeometry>& geometries,
-                                  const std::vector<Sights>& sights,
+                                  const std::vector<double>& errors,
                                   const PixelMap& map) {
   const Vector2d scale = map.image_from_camera.leftCols<2>().diagonal();
   if (!(scale.minCoeff() > kLeastShare)) return {};
   std::set<int32_t> cameras;
   for (const int32_t n : map.images) cameras.insert(geometries[n].camera);
-  for (size_t n = 0; n < sights.size(); ++n) {
+  size_t num_others = 0;
+  for (size_t n = 0; n < errors.size(); ++n) {
     const bool is_mapped = std::binary_search(
         map.images.begin(), map.images.end(), static_cast<int32_t>(n));
-    if (!is_mapped && !sights[n].empty() &&
-        cameras.count(geometries[n].camera) > 0) {
-      return {};
+    if (is_mapped || errors[n] == 0 ||
+        cameras.count(geometries[n].camera) == 0) {
+      continue;
     }
+    if (errors[n] <= kFilteredPx) return {};
+    ++num_others;
   }
+  if (num_others > map.images.size()) return {};
+
   const bool is_resized = map.image_from_camera.col(2).isZero();
   std::vector<Camera> mapped;
   for (const int32_t c : cameras) {
@@ -289,15 +294,22 @@ PixelMaps FindPixelMaps(const Model& model,
                         const std::vector<ImageGeometry>& geometries,
                         const Context& context) {
   const std::vector<Sights> sights = SightsOfImages(model, geometries);
-  std::vector<double> errors(sights.size(), 0);  // as read
+  std::vector<double> errors(sights.size(), 0);  // as read; 0: not asked
+
+  std::vector<double> sound;
   std::vector<int32_t> asked;
   size_t num_images = 0;
   for (size_t n = 0; n < sights.size(); ++n) {
     if (sights[n].empty()) continue;
     ++num_images;
     errors[n] = MedianError(sights[n], kAsRead);
-    if (errors[n] > kFilteredPx) asked.push_back(static_cast<int32_t>(n));
+    if (errors[n] > kFilteredPx) {
+      asked.push_back(static_cast<int32_t>(n));
+    } else {
+      sound.push_back(errors[n]);
+    }
   }
+  const double sound_px = sound.empty() ? 0 : LowerMedian(std::move(sound));
   // The asked images that a map explains, hardly less well than their own map.
   std::vector<double> own_errors(sights.size(), -1);
   const auto explained = [&](const Matrix23& map) {
@@ -307,7 +319,7 @@ PixelMaps FindPixelMaps(const Model& model,
       if (mapped > std::min(kFilteredPx, errors[n] / 4)) continue;
       double& own = own_errors[n];
       if (own < 0) own = MedianError(sights[n], FitMap(sights[n]));
-      if (mapped <= std::max(0.1, 1.5 * own)) images.push_back(n);
+      if (mapped <= std::max(0.1, 2 * own)) images.push_back(n);
     }
     return images;
   };
@@ -318,14 +330,17 @@ PixelMaps FindPixelMaps(const Model& model,
          !context.IsCancelled()) {
     PixelMap one;
     one.images = {asked.front()};
-    for (const bool is_of_all : {false, true}) {
-      if (is_of_all && one.images.size() < kFewestImages) break;
+    for (size_t num = 0; one.images.size() > num;) {
+      num = one.images.size();
       one.image_from_camera = FitMap(SightsOf(sights, one.images));
       one.images = explained(one.image_from_camera);
     }
     const Sights own = SightsOf(sights, one.images);
-    if (one.images.size() < kFewestImages ||
-        !IsNoMove(one.image_from_camera, own)) {
+    // Few may have the same pose error by chance, or hardly any sound pixel.
+    const bool is_few = one.images.size() < kFewImages;
+    if (own.empty() ||
+        (is_few && MedianError(own, one.image_from_camera) > 2 * sound_px) ||
+        !IsNoMove(one.image_from_camera, own, is_few ? 2 : 1)) {
       ++num_in_vain;
       asked.erase(asked.begin());
       continue;
@@ -338,7 +353,7 @@ PixelMaps FindPixelMaps(const Model& model,
     asked.clear();
     std::set_difference(left.begin(), left.end(), one.images.begin(),
                         one.images.end(), std::back_inserter(asked));
-    one.cameras = MappedCameras(model, geometries, sights, one);
+    one.cameras = MappedCameras(model, geometries, errors, one);
     for (const int32_t n : one.images) {
       one.image_names.push_back(model.images[n].name);
     }

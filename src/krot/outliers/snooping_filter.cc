@@ -8,6 +8,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "krot/analysis/model_comparison.h"
 #include "krot/analysis/noise.h"
 #include "krot/base/context.h"
 #include "krot/convert/reprojection.h"
@@ -96,7 +97,8 @@ class SnoopingFilter : private Filtering {
   }
 
   // Where cameras hold points within rounding, the solves may end higher than
-  // the input: then what is kept stays there.
+  // the input, and where pixels are meaningless all points may fall together:
+  // then what is kept stays there.
   void StayIfBetter() {
     const ErrorLoss& loss = options_.solve.finish.loss;
     std::vector<double> before;
@@ -109,8 +111,10 @@ class SnoopingFilter : private Filtering {
       cost += loss.Value(error * error);
     }
     summary_.snooping->kept_error_before = Summarize(before);
-    summary_.snooping->is_solved = cost <= cost_before;
-    if (cost <= cost_before) return;
+    bool& is_solved = summary_.snooping->is_solved;
+    is_solved = cost <= cost_before &&
+                !FindCollapse(model_, kept_.model, context_).IsWhole();
+    if (is_solved) return;
     kept_ = RemoveObservations(model_, is_removed_);
   }
 

@@ -69,33 +69,9 @@ std::string ImageTable(const ModelCheck& check, ImageVerdict verdict,
          "\n" + TableOf(head, images, row, max_rows);
 }
 
-std::string ObservationTable(const ModelCheck& check, size_t max_rows) {
-  return TitledTable(
-      "Wrong observations, of images that are not wrong: w, the error over "
-      "what noise makes of it, is above " +
-          FormatNumber(check.critical_w, 2),
-      {"image", "2D point", "3D point", "w", "error, px", ""},
-      check.observations, max_rows, [](const WrongObservation& one) -> Row {
-        return {one.image_name,
-                one.point2D_idx,
-                one.point3D_id,
-                std::isfinite(one.w) ? FormatNumber(one.w, 1) : "not in front",
-                FormatNumber(one.error_px, 2),
-                one.is_of_two ? "this or the other one" : ""};
-      });
-}
-
-std::string TrackTable(const ModelCheck& check, size_t max_rows) {
-  return TitledTable(
-      "Tracks that are two points: " + Thousands(check.tracks.size()),
-      {"3D point", "observations that agree", "that agree on another",
-       "which is at"},
-      check.tracks, max_rows, [](const TwoPointTrack& track) -> Row {
-        return {track.point3D_id, track.num_first, track.num_second,
-                FormatNumber(track.second.x(), 3) + " " +
-                    FormatNumber(track.second.y(), 3) + " " +
-                    FormatNumber(track.second.z(), 3)};
-      });
+// COLMAP writes into folders that are there.
+std::string Folder(const std::string& name) {
+  return "    mkdir -p " + name + "\n";
 }
 
 std::string RobustAdjustment(const std::string& model, double scale_px,
@@ -166,10 +142,16 @@ std::string NextSteps(const CheckReport& report) {
   }
   if (num_wrong > static_cast<int64_t>(report.moved.size())) {
     text += "  Place the " + std::string(report.moved.empty() ? "" : "other ") +
-            "wrong images anew, from their matches:\n    colmap "
-            "image_registrator --database_path " +
-            database + " --input_path " + model + " --output_path REGISTERED\n";
+            "wrong images anew, from their matches:\n" + Folder("REGISTERED") +
+            "    colmap image_registrator --database_path " + database +
+            " --input_path " + model + " --output_path REGISTERED\n";
     model = "REGISTERED";
+    if (report.database_path.empty()) {
+      text +=
+          "  Or, without a database, adjust the input with a loss that wrong "
+          "observations do not bend:\n" +
+          RobustAdjustment(input, check.cauchy_scale_px.value_or(1));
+    }
   }
   if (std::any_of(check.images.begin(), check.images.end(),
                   [](const ImageCheck& image) {
@@ -188,17 +170,17 @@ std::string NextSteps(const CheckReport& report) {
             (check.parts.empty() ? "" : " between the parts") +
             ", and their points:\n    "
             "colmap exhaustive_matcher --database_path " +
-            database +
-            " --SiftMatching.guided_matching 1\n    colmap point_triangulator "
-            "--database_path " +
-            database + " --image_path IMAGES --input_path " + model +
+            database + " --SiftMatching.guided_matching 1\n" +
+            Folder("TRIANGULATED") + "    colmap point_triangulator " +
+            "--database_path " + database +
+            " --image_path IMAGES --input_path " + model +
             " --output_path TRIANGULATED\n";
     model = "TRIANGULATED";
   }
   if (!check.cauchy_scale_px) {
-    return text +
-           "  Then adjust all that is left:\n    colmap bundle_adjuster " +
-           "--input_path " + model + " --output_path ADJUSTED\n";
+    return text + "  Then adjust all that is left:\n" + Folder("ADJUSTED") +
+           "    colmap bundle_adjuster --input_path " + model +
+           " --output_path ADJUSTED\n";
   }
   return text +
          "  Then adjust all that is left, with the loss that suits errors with "
@@ -252,8 +234,13 @@ std::string WhatContradicts(const CheckReport& report) {
       });
   const std::string by_more =
       " by more than " + NoiseWords(check) + " explains";
+  const auto first_wrong = std::find_if(
+      check.images.begin(), check.images.end(), [](const ImageCheck& image) {
+        return image.verdict == ImageVerdict::kWrong;
+      });
   const std::string images =
-      Thousands(num_wrong) + " of " + Counted(check.images.size(), "image");
+      Thousands(num_wrong) + " of " + Counted(check.images.size(), "image") +
+      (num_wrong == 1 ? " (" + first_wrong->name + ")" : "");
   const std::string observations = Thousands(num_observations) + " of " +
                                    Thousands(report.num_observations) +
                                    " observations";
@@ -316,6 +303,10 @@ std::string ForAdjusted(const CheckReport& report) {
         "a whole group is wrong, or those matches are");
   }
   if (text.empty()) text = NothingIsWrong(report);
+  const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
+  if (num_weak > 0 && check.IsAnythingWrong()) {
+    text += "; " + Counted(num_weak, "image", "is", "are") + " weakly held";
+  }
   // Parts may be elsewhere as a whole, whatever else is wrong.
   if (!check.parts.empty()) {
     text += (check.IsAnythingWrong() ? "; and " : "; but ") +

@@ -112,12 +112,14 @@ std::string CameraWords(const PixelMap& map) {
     asked += TextIf(!asked.empty(), " and ") + "the principal point (" +
              pair(center) + ") px";
   }
+  const std::string images = map.images.size() == 1
+                                 ? "image asks"
+                                 : Counted(map.images.size(), "image") + " ask";
   return (is_one ? "camera " + std::to_string(camera.id) + " is wrong: its "
                  : Counted(map.cameras.size(), "camera") +
                        " are wrong, first of all camera " +
                        std::to_string(camera.id) + ": their ") +
-         Counted(map.images.size(), "image") + " ask for " + asked +
-         TextIf(!is_one, " there");
+         images + " for " + asked + TextIf(!is_one, " there");
 }
 
 // For example "the 2D points of 25 images (a.jpg, ...) are not those of their
@@ -143,8 +145,8 @@ std::string PixelWords(const PixelMap& map) {
                           FormatNumber(shift.y(), 1) + ") px");
   }
   return "the 2D points of " + Counted(map.images.size(), "image") + " (" +
-         map.image_names.front() +
-         ", ...) are not those of their photos, but " +
+         map.image_names.front() + TextIf(map.images.size() > 1, ", ...") +
+         ") are not those of their photos, but " +
          ListText(std::move(differences));
 }
 

@@ -157,6 +157,35 @@ std::string CameraTable(const ModelCheck& check, size_t max_rows) {
       });
 }
 
+std::string ObservationTable(const ModelCheck& check, size_t max_rows) {
+  return TitledTable(
+      "Wrong observations, of images that are not wrong: w, the error over "
+      "what noise makes of it, is above " +
+          FormatNumber(check.critical_w, 2),
+      {"image", "2D point", "3D point", "w", "px off the rest", ""},
+      check.observations, max_rows, [](const WrongObservation& one) -> Row {
+        return {one.image_name,
+                one.point2D_idx,
+                one.point3D_id,
+                std::isfinite(one.w) ? FormatNumber(one.w, 1) : "not in front",
+                FormatNumber(one.error_px, 2),
+                one.is_of_two ? "this or the other one" : ""};
+      });
+}
+
+std::string TrackTable(const ModelCheck& check, size_t max_rows) {
+  return TitledTable(
+      "Tracks that are two points: " + Thousands(check.tracks.size()),
+      {"3D point", "observations that agree", "that agree on another",
+       "which is at"},
+      check.tracks, max_rows, [](const TwoPointTrack& track) -> Row {
+        return {track.point3D_id, track.num_first, track.num_second,
+                FormatNumber(track.second.x(), 3) + " " +
+                    FormatNumber(track.second.y(), 3) + " " +
+                    FormatNumber(track.second.z(), 3)};
+      });
+}
+
 nlohmann::ordered_json CamerasJson(const ModelCheck& check) {
   return ListJson(check.cameras, [](const WrongCamera& camera) {
     const auto only = [&](CameraFault fault, const Json& values) {

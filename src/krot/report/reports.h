@@ -147,6 +147,9 @@ std::string ConventionsSentence(const Conventions& conventions);
 // least.
 std::string CamerasSentence(const ModelCheck& check);
 std::string CameraTable(const ModelCheck& check, size_t max_rows);
+// Wrong observations, and tracks that are two points.
+std::string ObservationTable(const ModelCheck& check, size_t max_rows);
+std::string TrackTable(const ModelCheck& check, size_t max_rows);
 
 // What the model still has that no adjustment mends, and what helps: a line for
 // each; "" if there is nothing.
