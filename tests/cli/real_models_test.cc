@@ -211,7 +211,6 @@ TEST_P(StartOnRealModel, WithoutTranslationsGivesTheOptimum) {
 INSTANTIATE_TEST_SUITE_P(Local, StartOnRealModel,
                          ::testing::Values(RealModel{"crane8_txt", 3.1011},
                                            RealModel{"fountain11", 3.2858},
-                                           RealModel{"longtracks92", 3.4528},
                                            RealModel{"maupertuis4_txt", 2.5369},
                                            RealModel{"room50_opencv", 3.6473},
                                            RealModel{"south128", 3.1778},

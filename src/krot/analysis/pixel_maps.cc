@@ -32,7 +32,6 @@ using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
 constexpr size_t kFewestSights = 10;  // of an image that is asked
 constexpr int64_t kMostSights = 100;  // of an image, evenly spread
-constexpr size_t kFewImages = 3;
 // Of the photo's size: others are not so much smaller, and a principal point is
 // farther from the edges.
 constexpr double kLeastShare = 0.1;
@@ -67,7 +66,10 @@ std::vector<Sights> SightsOfImages(
       const auto projected = ProjectPoint(camera, x_cam);
       const Point2D& pixel =
           model.images[n].points2D[model.track_elements[e].point2D_idx];
-      if (!projected || !std::isfinite(pixel.x + pixel.y)) continue;
+      if (!projected || !projected->allFinite() ||
+          !std::isfinite(pixel.x + pixel.y)) {
+        continue;
+      }
       sights[n].push_back({&camera, x_cam, *projected, {pixel.x, pixel.y}});
     }
   }
@@ -91,7 +93,10 @@ template <typename ErrorOfSight>
 double MedianError(const Sights& sights, const ErrorOfSight& error_of) {
   std::vector<double> errors;
   errors.reserve(sights.size());
-  for (const Sight& sight : sights) errors.push_back(error_of(sight));
+  for (const Sight& sight : sights) {
+    const double error = error_of(sight);
+    errors.push_back(std::isnan(error) ? kInfinity : error);
+  }
   return LowerMedian(std::move(errors));
 }
 
@@ -231,15 +236,6 @@ bool IsNoMove(const Matrix23& map, Sights sights, double factor) {
   return factor * mapped < moved;
 }
 
-Sights SightsOf(const std::vector<Sights>& all,
-                const std::vector<int32_t>& images) {
-  Sights joined;
-  for (const int32_t n : images) {
-    joined.insert(joined.end(), all[n].begin(), all[n].end());
-  }
-  return joined;
-}
-
 // The cameras of the images as the map has them. Empty if an image of theirs
 // fits as read or most fit in no way, or if no camera has such pixels: with
 // other axes, normalised, from the middle of the photo, or with two scales for
@@ -276,8 +272,9 @@ std::vector<Camera> MappedCameras(const Model& model,
     }
     const std::array<uint64_t*, 2> size = {&camera.width, &camera.height};
     for (const int i : {0, 1}) {
-      if (is_resized)
+      if (is_resized) {
         *size[i] = std::llround(scale[i] * static_cast<double>(*size[i]));
+      }
       if (i < center) camera.params[i] *= scale[i];
       double& principal = camera.params[center + i];
       principal = scale[i] * principal + map.image_from_camera(i, 2);
@@ -288,89 +285,133 @@ std::vector<Camera> MappedCameras(const Model& model,
   return mapped;
 }
 
+class PixelMapSearch {
+ public:
+  // Keeps references.
+  PixelMapSearch(const Model& model,
+                 const std::vector<ImageGeometry>& geometries)
+      : model_(model),
+        geometries_(geometries),
+        sights_(SightsOfImages(model, geometries)),
+        errors_(sights_.size(), 0),
+        own_errors_(sights_.size(), -1) {
+    std::vector<double> sound;
+    for (size_t n = 0; n < sights_.size(); ++n) {
+      if (sights_[n].empty()) continue;
+      ++num_images_;
+      errors_[n] = MedianError(sights_[n], kAsRead);
+      if (errors_[n] <= kFilteredPx) sound.push_back(errors_[n]);
+      if (errors_[n] > kFilteredPx) asked_.push_back(static_cast<int32_t>(n));
+    }
+    if (!sound.empty()) sound_px_ = LowerMedian(std::move(sound));
+  }
+
+  PixelMaps Run(const Context& context) {
+    int num_in_vain = 0;
+    while (!asked_.empty() && num_in_vain < kMostInVain &&
+           !context.IsCancelled()) {
+      PixelMap map = MapOf(asked_.front());
+      if (!Counts(map)) {
+        ++num_in_vain;
+        asked_.erase(asked_.begin());
+      } else {
+        Take(std::move(map));
+      }
+    }
+    if (found_.pixel_maps.empty()) return {};
+    found_.median_error_as_read_px = LowerMedian(std::move(before_));
+    found_.median_error_px = LowerMedian(std::move(after_));
+    return {found_, MayBeOther(found_.pixel_maps.front())};
+  }
+
+ private:
+  // The map of an image, and of all that it explains.
+  PixelMap MapOf(int32_t image) {
+    PixelMap map;
+    map.images = {image};
+    for (size_t num = 0; map.images.size() > num;) {
+      num = map.images.size();
+      map.image_from_camera = FitMap(SightsOf(map));
+      map.images = ExplainedBy(map.image_from_camera);
+    }
+    return map;
+  }
+
+  // The asked images that a map explains, hardly less well than their own map.
+  std::vector<int32_t> ExplainedBy(const Matrix23& map) {
+    std::vector<int32_t> images;
+    for (const int32_t n : asked_) {
+      const double mapped = MedianError(sights_[n], map);
+      if (mapped > std::min(kFilteredPx, errors_[n] / 4)) continue;
+      double& own = own_errors_[n];
+      if (own < 0) own = MedianError(sights_[n], FitMap(sights_[n]));
+      if (mapped <= std::max(0.1, 2 * own)) images.push_back(n);
+    }
+    return images;
+  }
+
+  // One or two images may have the same pose error by chance, or hardly any
+  // sound pixel.
+  bool Counts(const PixelMap& map) const {
+    if (map.images.empty()) return false;
+    const bool is_few = map.images.size() < 3;
+    const Sights sights = SightsOf(map);
+    return (!is_few ||
+            MedianError(sights, map.image_from_camera) <= 2 * sound_px_) &&
+           IsNoMove(map.image_from_camera, sights, is_few ? 2 : 1);
+  }
+
+  void Take(PixelMap map) {
+    for (const Sight& sight : SightsOf(map)) {
+      before_.push_back(ErrorOf(kAsRead, sight));
+      after_.push_back(ErrorOf(map.image_from_camera, sight));
+    }
+    const std::vector<int32_t> asked = std::move(asked_);
+    asked_.clear();
+    std::set_difference(asked.begin(), asked.end(), map.images.begin(),
+                        map.images.end(), std::back_inserter(asked_));
+    map.cameras = MappedCameras(model_, geometries_, errors_, map);
+    for (const int32_t n : map.images) {
+      map.image_names.push_back(model_.images[n].name);
+    }
+    found_.pixel_maps.push_back(std::move(map));
+  }
+
+  bool MayBeOther(const PixelMap& map) const {
+    const Matrix2d change = (map.image_from_camera - kAsRead).leftCols<2>();
+    const bool is_of_all_photos =
+        map.images.size() == num_images_ && !change.isZero(0.25);
+    return is_of_all_photos ||
+           std::any_of(map.images.begin(), map.images.end(),
+                       [&](int32_t n) { return geometries_[n].sensor >= 0; });
+  }
+
+  Sights SightsOf(const PixelMap& map) const {
+    Sights joined;
+    for (const int32_t n : map.images) {
+      joined.insert(joined.end(), sights_[n].begin(), sights_[n].end());
+    }
+    return joined;
+  }
+
+  const Model& model_;
+  const std::vector<ImageGeometry>& geometries_;
+  const std::vector<Sights> sights_;  // by image
+  std::vector<double> errors_;        // as read; 0 without sights
+  std::vector<double> own_errors_;    // by the image's own map; -1: unknown
+  double sound_px_ = 0;               // of the images that fit as read
+  size_t num_images_ = 0;             // with sights
+  std::vector<int32_t> asked_;
+  Conventions found_;
+  std::vector<double> before_, after_;  // errors in all that is mapped
+};
+
 }  // namespace
 
 PixelMaps FindPixelMaps(const Model& model,
                         const std::vector<ImageGeometry>& geometries,
                         const Context& context) {
-  const std::vector<Sights> sights = SightsOfImages(model, geometries);
-  std::vector<double> errors(sights.size(), 0);  // as read; 0: not asked
-
-  std::vector<double> sound;
-  std::vector<int32_t> asked;
-  size_t num_images = 0;
-  for (size_t n = 0; n < sights.size(); ++n) {
-    if (sights[n].empty()) continue;
-    ++num_images;
-    errors[n] = MedianError(sights[n], kAsRead);
-    if (errors[n] > kFilteredPx) {
-      asked.push_back(static_cast<int32_t>(n));
-    } else {
-      sound.push_back(errors[n]);
-    }
-  }
-  const double sound_px = sound.empty() ? 0 : LowerMedian(std::move(sound));
-  // The asked images that a map explains, hardly less well than their own map.
-  std::vector<double> own_errors(sights.size(), -1);
-  const auto explained = [&](const Matrix23& map) {
-    std::vector<int32_t> images;
-    for (const int32_t n : asked) {
-      const double mapped = MedianError(sights[n], map);
-      if (mapped > std::min(kFilteredPx, errors[n] / 4)) continue;
-      double& own = own_errors[n];
-      if (own < 0) own = MedianError(sights[n], FitMap(sights[n]));
-      if (mapped <= std::max(0.1, 2 * own)) images.push_back(n);
-    }
-    return images;
-  };
-  Conventions found;
-  std::vector<double> before, after;
-  int num_in_vain = 0;
-  while (!asked.empty() && num_in_vain < kMostInVain &&
-         !context.IsCancelled()) {
-    PixelMap one;
-    one.images = {asked.front()};
-    for (size_t num = 0; one.images.size() > num;) {
-      num = one.images.size();
-      one.image_from_camera = FitMap(SightsOf(sights, one.images));
-      one.images = explained(one.image_from_camera);
-    }
-    const Sights own = SightsOf(sights, one.images);
-    // Few may have the same pose error by chance, or hardly any sound pixel.
-    const bool is_few = one.images.size() < kFewImages;
-    if (own.empty() ||
-        (is_few && MedianError(own, one.image_from_camera) > 2 * sound_px) ||
-        !IsNoMove(one.image_from_camera, own, is_few ? 2 : 1)) {
-      ++num_in_vain;
-      asked.erase(asked.begin());
-      continue;
-    }
-    for (const Sight& sight : own) {
-      before.push_back(ErrorOf(kAsRead, sight));
-      after.push_back(ErrorOf(one.image_from_camera, sight));
-    }
-    const std::vector<int32_t> left = std::move(asked);
-    asked.clear();
-    std::set_difference(left.begin(), left.end(), one.images.begin(),
-                        one.images.end(), std::back_inserter(asked));
-    one.cameras = MappedCameras(model, geometries, errors, one);
-    for (const int32_t n : one.images) {
-      one.image_names.push_back(model.images[n].name);
-    }
-    found.pixel_maps.push_back(std::move(one));
-  }
-  if (found.pixel_maps.empty()) return {};
-  found.median_error_as_read_px = LowerMedian(std::move(before));
-  found.median_error_px = LowerMedian(std::move(after));
-  const PixelMap& first = found.pixel_maps.front();
-  const auto is_of_sensor = [&](int32_t n) {
-    return geometries[n].sensor >= 0;
-  };
-  const bool is_of_all =
-      first.images.size() == num_images &&
-      !(first.image_from_camera - kAsRead).leftCols<2>().isZero(0.25);
-  return {found, is_of_all || std::any_of(first.images.begin(),
-                                          first.images.end(), is_of_sensor)};
+  return PixelMapSearch(model, geometries).Run(context);
 }
 
 }  // namespace krot::internal
