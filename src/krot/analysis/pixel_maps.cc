@@ -120,6 +120,8 @@ double SizeOf(const Sights& sights) {
   return LowerMedian(std::move(seen)) / LowerMedian(std::move(projected));
 }
 
+using Rows = std::pair<SmallMatrix, Vector2d>;
+
 // The x = x0 + P y with the least sum of distances |J x - r|, where rows_of
 // gives (J, r) of a sight: least squares with weights anew.
 template <typename RowsOf>
@@ -142,36 +144,10 @@ SmallVector LeastDistances(const Sights& sights, const SmallVector& x0,
   return x;
 }
 
-using Rows = std::pair<SmallMatrix, Vector2d>;
-
-// The affine map, row by row.
-Matrix23 AffineMap(const Sights& sights) {
-  SmallVector identity(6);
-  identity << 1, 0, 0, 0, 1, 0;
-  const SmallVector x = LeastDistances(
-      sights, identity, SmallMatrix::Identity(6, 6), [](const Sight& sight) {
-        SmallMatrix J = SmallMatrix::Zero(2, 6);
-        J.block<1, 3>(0, 0) = sight.projected.homogeneous().transpose();
-        J.block<1, 3>(1, 3) = sight.projected.homogeneous().transpose();
-        return Rows(J, sight.pixel);
-      });
-  Matrix23 map;
-  map << x.head<3>().transpose(), x.tail<3>().transpose();
-  return map;
-}
-
 // The simplest map along the photo's axes that leaves hardly more than the most
 // general one: a shift; a scale, or one for each axis; or both.
 Matrix23 FitMap(const Sights& sights) {
-  const Matrix23 affine = AffineMap(sights);
-  // The axes that the map takes to the image's.
-  Matrix2d axes = Matrix2d::Zero();
-  const Matrix2d size = affine.leftCols<2>().cwiseAbs();
-  const bool is_exchanged = size(0, 0) * size(1, 1) < size(0, 1) * size(1, 0);
-  for (const int i : {0, 1}) {
-    const int j = is_exchanged ? 1 - i : i;
-    axes(i, j) = affine(i, j) < 0 ? -1 : 1;
-  }
+  Matrix2d axes = Matrix2d::Identity();
   const auto fit = [&](const SmallVector& x0, const SmallMatrix& P) {
     const SmallVector x =
         LeastDistances(sights, x0, P, [&](const Sight& sight) {
@@ -185,12 +161,18 @@ Matrix23 FitMap(const Sights& sights) {
     map << x.head<2>().asDiagonal() * axes, x.tail<2>();
     return map;
   };
-  const Vector4d same(1, 1, 0, 0);
+  const SmallVector zero = SmallVector::Zero(4);
   const SmallMatrix all = SmallMatrix::Identity(4, 4);
+  Matrix23 general = fit(zero, all);
+  axes << 0, 1, 1, 0;
+  const Matrix23 exchanged = fit(zero, all);
+  if (MedianError(sights, exchanged) < MedianError(sights, general)) {
+    general = exchanged;
+  }
+  axes = general.leftCols<2>().array().sign();
+  const Vector4d same(1, 1, 0, 0);
   SmallMatrix scale_and_shift(4, 3);
   scale_and_shift << same, all.rightCols<2>();
-  const SmallVector zero = SmallVector::Zero(4);
-  const Matrix23 general = fit(zero, all);
   const double most = 1.1 * MedianError(sights, general);
   for (const Matrix23& map :
        {fit(same, all.rightCols<2>()), fit(zero, same),
