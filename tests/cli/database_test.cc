@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -217,6 +218,21 @@ TEST_F(DatabaseOption, ProvesWhatNoBaselinesExplain) {
                     "--certificate_path", certificate});
   EXPECT_THAT(result, IsRefused(1, "krot certificate_checker",
                                 "--database_path is required"));
+}
+
+TEST_F(DatabaseOption, GivesNoProofThatItsCheckerRefuses) {
+  Succeeded(RunKrot({"model_synthesizer", "--output_path", folder_ / "few",
+                     "--database_path", folder_ / "few.db",
+                     "--Scene.camera_model", "EQUIRECTANGULAR",
+                     "--Scene.has_rigs", "0", "--Scene.pixel_noise", "0.5",
+                     "--Scene.num_frames", "10", "--Scene.num_points", "200"}));
+  const std::string proof = folder_ / "few.json";
+  const KrotResult result = Succeeded(RunKrot(
+      {"model_checker", "--input_path", folder_ / "few", "--database_path",
+       folder_ / "few.db", "--certificate_path", proof}));
+  EXPECT_FALSE(std::filesystem::exists(proof));
+  EXPECT_THAT(result.err, HasSubstr("there is no certificate, so " + proof +
+                                    " is not written"));
 }
 
 TEST_F(DatabaseOption, OfASyntheticSceneGivesColmapAndKrotTheSamePoints) {

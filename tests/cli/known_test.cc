@@ -211,6 +211,26 @@ TEST_F(Known, RotationsThatAreInexactTellByHowMuchTheyTurn) {
   EXPECT_THAT(result.err, Not(HasSubstr("warning")));
 }
 
+TEST_F(Known, RotationsOfAnyLengthAreWrittenOfUnitLength) {
+  const Model model = SmallLegacyModel();
+  Save(model, folder_ / "input");
+  const Eigen::Quaterniond turn(
+      Eigen::AngleAxisd(1e-4, Eigen::Vector3d::UnitX()));
+  std::ofstream(folder_ / "rotations.txt")
+      << ChangedRotationLines(model, [&](const Eigen::Quaterniond& q) {
+           QuaternionWxyz longer = ToWxyz(turn * q);
+           for (double& number : longer) number *= 1000;
+           return longer;
+         });
+  Succeeded(Solve("input", "output",
+                  {"--rotations_path", folder_ / "rotations.txt"}));
+  for (const Image& image : Load(folder_ / "output").images) {
+    double square = 0;
+    for (const double q : image.cam_from_world.quaternion_wxyz) square += q * q;
+    EXPECT_NEAR(square, 1, 1e-14);
+  }
+}
+
 TEST_F(Known, PosesWithTheirHalvesExchangedAreWarnedOf) {
   Model model = SmallLegacyModel();
   for (Image& image : model.images) {

@@ -248,5 +248,35 @@ TEST_F(Metres, OfLengthsAreBoundedByToleranceAnalyzer) {
   EXPECT_THAT(result.out, Not(HasSubstr("x from")));
 }
 
+TEST_F(Metres, RadiiThatAreUnknownAreTheMedianOfTheOthers) {
+  WritePositions("");
+  std::ofstream points(folder_ / "points.txt");
+  points.precision(17);
+  for (size_t k = 0; k < 3; ++k) {
+    points << model_.points3D[k].id << ' '
+           << (own_from_model_ * model_.points3D[k].xyz).transpose()
+           << " 0.2\n";
+  }
+  points.close();
+  const std::string count = std::to_string(model_.images.size());
+  const KrotResult result = Succeeded(SolveIn(
+      "model", "output", {"--point_positions_path", folder_ / "points.txt"}));
+  EXPECT_THAT(
+      result.err,
+      HasSubstr(count + " of " + std::to_string(model_.images.size() + 3) +
+                " positions have no radius or covariance that can be "
+                "used: they take the median of the others' radii, "
+                "0.2"));
+}
+
+TEST_F(Metres, ARadiusThatNoPositionNeedsIsSaidToBeOfNoUse) {
+  WritePositions("0.2");
+  const Words radius = {"--Problem.position_radius", "3"};
+  const std::string sentence = "--Problem.position_radius is not used: ";
+  EXPECT_THAT(SolveIn("model", "unused", radius).err, HasSubstr(sentence));
+  WritePositions("");
+  EXPECT_THAT(SolveIn("model", "used", radius).err, Not(HasSubstr(sentence)));
+}
+
 }  // namespace
 }  // namespace krot::internal

@@ -337,6 +337,12 @@ TEST_F(Options, InAProjectFileAreChecked) {
   ExpectRefused("solver", arguments, "is given twice");
   WriteBytes(file, "[Solver\nnorm\n");
   ExpectRefused("solver", arguments, file);
+  // Not even one without an end is read.
+  ExpectRefused("solver", Paths() + Words{"--project_path", "/dev/zero"},
+                "must be a file that can be read");
+  EXPECT_THAT(RunKrot({"certificate_checker", "--input_path", folder_.path(),
+                       "--certificate_path", "/dev/zero"}),
+              IsRefused(2, "krot certificate_checker", "not a regular file"));
 }
 
 TEST_F(Options, InAProjectFileMayComeFromWindows) {

@@ -138,6 +138,46 @@ TEST_F(KnownPositions, ThatCannotBeKeptAreNamedAndRefuted) {
   Succeeded(Check("input", "output"));
 }
 
+TEST_F(KnownPositions, OfWhatMustNotMoveAreCheckedAndCounted) {
+  const std::string& name = model_.images[kWrong].name;
+  std::ofstream(folder_ / "fixed.txt") << name << '\n';
+  const Words fixed = {"--fixed_images_path", folder_ / "fixed.txt"};
+  WritePositions(1e-3, 0.5e-3);
+  Succeeded(Solve("input", "output", Options(fixed)));
+  EXPECT_EQ(Report("output")["positions"]["num_known"], model_.images.size());
+  EXPECT_NEAR(Report("output")["positions"]["largest_ratio"], 1, 0.5);
+  WritePositions(1e-3, 5e-3);
+  for (const std::string command : {"solver", "bundle_adjuster"}) {
+    EXPECT_THAT(
+        RunKrot({command, "--input_path", folder_ / "input", "--output_path",
+                 folder_ / "refused"},
+                Options(fixed)),
+        IsRefused(2, "krot " + command, "found " + name + " fixed at "));
+  }
+  const std::string id = std::to_string(model_.points3D[1].id);
+  std::ofstream(folder_ / "fixed.txt") << id << '\n';
+  std::ofstream(folder_ / "points.txt") << id << " 100 100 100 0.1\n";
+  EXPECT_THAT(
+      Solve("input", "refused",
+            {"--fixed_points_path", folder_ / "fixed.txt",
+             "--point_positions_path", folder_ / "points.txt"}),
+      IsRefused(2, "krot solver", "within the radius around 100 100 100, its"));
+  // Both images of a frame.
+  const Model rig = SmallRigModel(2);
+  Save(rig, folder_ / "rig");
+  const ImageId first = rig.images[0].id;
+  const std::vector<ImageGeometry> geometries = ImageGeometries(rig);
+  for (size_t n = 1; n < rig.images.size(); ++n) {
+    if (geometries[n].frame != geometries[0].frame) continue;
+    std::ofstream(folder_ / "fixed.txt") << first << '\n';
+    std::ofstream(folder_ / "positions.txt")
+        << rig.images[n].name << " 100 100 100 0.1\n";
+  }
+  EXPECT_THAT(
+      Solve("rig", "refused", Options(fixed)),
+      IsRefused(2, "krot solver", "within the radius around 100 100 100, its"));
+}
+
 TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
   const std::string name = model_.images[0].name;
   const auto solve = [&](const std::string& text) {

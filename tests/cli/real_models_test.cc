@@ -282,5 +282,18 @@ INSTANTIATE_TEST_SUITE_P(
         WrongRealModel{"edge_lfs_pointers", 2, "Git LFS"}),
     [](const auto& test) { return std::string(test.param.folder); });
 
+// From nothing its errors end above the input's.
+TEST(SolverOnWide17, GoesOnFromTheModelWhereAStartFromNothingIsNoBetter) {
+  if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
+  const TempFolder folder;
+  Succeeded(RunKrot({"solver", "--input_path", *RealModels() / "wide17",
+                     "--output_path", folder / "output", "--report_path",
+                     folder / "r.json", "--Solver.init", "feasible"}));
+  const Json report = ReadJson(folder / "r.json");
+  EXPECT_EQ(report["termination"], "gap_reached");
+  EXPECT_LT(report["pixel_error"]["after"]["max"],
+            report["pixel_error"]["before"]["max"]);
+}
+
 }  // namespace
 }  // namespace krot::internal

@@ -105,6 +105,26 @@ TEST_F(PosePriors, AreReadOfEveryColmap) {
   }
 }
 
+TEST_F(PosePriors, KeepTheirCovariancesBesideOneThatCannotBeUsed) {
+  const std::string position = BlobOfPosition(Vector3d(1, 2, 3));
+  const std::string of = ", " + position + ", 1, ";
+  Write(kImageForm +
+        ("INSERT INTO pose_priors VALUES (1" + of +
+         BlobOf({4, 0, 0, 0, 4, 0, 0, 0, 4}) + "), (2" + of +
+         BlobOf({1, 0, 0, 0, 1, 0, 0, 0, 1e20}) + "), (3" + of + "NULL);"));
+  const auto radii = [&](const PositionsOptions& options) {
+    std::vector<double> found;
+    for (const KnownPosition& known : Read(options)) {
+      found.push_back(known.region.semi_axes[0]);
+    }
+    return found;
+  };
+  EXPECT_EQ(radii({}), (std::vector<double>{6, 0, 0}));
+  PositionsOptions options;
+  options.radius = 5;
+  EXPECT_EQ(radii(options), (std::vector<double>{6, 5, 5}));
+}
+
 // The same places, as COLMAP 3.10 and later write them, and as 3.8 did.
 TEST_F(PosePriors, OfTheImagesTableAreLatitudeLongitudeAndHeight) {
   const Vector3d places[] = {{47.5, 9.25, 400}, {47.501, 9.25, 410}};

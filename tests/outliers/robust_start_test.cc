@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -436,6 +437,39 @@ TEST(PlaceSearch, KnowsNoScaleAboutASingleFrame) {
   };
   EXPECT_LT(deviation(5), 0.1);
   EXPECT_EQ(deviation(0), INFINITY);
+}
+
+// Some 10^12 triples of these are never counted one by one.
+TEST(PlaceSearch, FindsATurnByAFewOfAnyNumberOfTracks) {
+  const BuiltProblem built =
+      BuildProblem(SynthesizeScene(SceneOf(12, 2000, 6)).ground_truth, {});
+  const KnownRotationProblem& problem = built.problem;
+  const std::vector<AffineMap> cameras =
+      CamerasFromWorld(problem, built.start.translations);
+  std::vector<SharedTrack> tracks;
+  while (tracks.size() < 20000) {
+    for (int32_t k = 0; k < problem.num_points; ++k) {
+      SharedTrack track;
+      for (const int64_t i : problem.OfPoint(k)) {
+        (problem.FrameOf(i) % 2 == 0 ? track.a : track.b)
+            .observations.push_back(i);
+      }
+      if (std::min(track.a.observations.size(), track.b.observations.size()) <
+          2) {
+        continue;
+      }
+      for (Side* side : {&track.a, &track.b}) {
+        side->x = built.start.points[k];
+        side->H = NormalOf(problem, cameras, *side, side->x).H;
+      }
+      tracks.push_back(track);
+    }
+  }
+  const PlaceSearch search(problem, built.start, 2, std::move(tracks));
+  const std::optional<Place> place = search.ProposeTurned();
+  ASSERT_TRUE(place);
+  EXPECT_NEAR(place->scale, 1, 1e-6);
+  EXPECT_NEAR((place->rotation - Eigen::Matrix3d::Identity()).norm(), 0, 1e-6);
 }
 
 // A fifth of the tracks has no wrong observation.

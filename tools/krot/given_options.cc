@@ -84,9 +84,11 @@ std::vector<OptionAssignment> GivenOptions(
 
 std::vector<OptionAssignment> ReadProjectFile(
     const std::string& path, const std::vector<Option>& options) {
-  std::ifstream stream{std::filesystem::path(path)};
+  const std::filesystem::path file(path);
+  std::ifstream stream;
   std::error_code ignored;
-  if (!stream || std::filesystem::is_directory(path, ignored)) {
+  if (std::filesystem::is_regular_file(file, ignored)) stream.open(file);
+  if (!stream.is_open()) {
     throw OptionError("--project_path = " + path +
                       ", must be a file that can be read");
   }

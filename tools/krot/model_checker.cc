@@ -190,9 +190,15 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
   }
   if (!command.certificate_path.empty()) {
     BeginPhase(log, "writing " + command.certificate_path);
-    WriteFileAtomically(
-        command.certificate_path,
-        BaselineJson(DescribeBaselines(model, *report.check.pairs)));
+    const BaselineCertificate proof =
+        DescribeBaselines(model, *report.check.pairs);
+    if (VerifyBaselines(model, *database, proof).is_accepted) {
+      WriteFileAtomically(command.certificate_path, BaselineJson(proof));
+    } else {
+      LogLine(log, 0,
+              "warning: there is no certificate, so " +
+                  command.certificate_path + " is not written");
+    }
   }
   RecordEnd(total_timer, num_threads, &report.run);
   WriteViews(command, report, write_options, model, cured, database);

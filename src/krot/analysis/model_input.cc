@@ -261,6 +261,43 @@ std::vector<KnownPosition> InOwnFrame(const PositionFrame& frame) {
   return positions;
 }
 
+namespace {
+
+// Gives positions whose radius is unknown (zero) the median of the others, if
+// there are others, and tells `on_note`, also of a given radius without use.
+void CompleteRadii(const std::optional<double>& given, const FileNote& on_note,
+                   std::vector<KnownPosition>* positions) {
+  std::vector<double> known;
+  bool is_used = false;
+  for (const KnownPosition& position : *positions) {
+    const Eigen::Vector3d& axes = position.region.semi_axes;
+    if (axes.minCoeff() > 0) known.push_back(std::cbrt(axes.prod()));
+    is_used |= position.region.IsBall() && axes[0] == given;
+  }
+  if (given && !is_used && on_note) {
+    on_note(
+        "--Problem.position_radius is not used: all positions have their own "
+        "radii");
+  }
+  const size_t num_without = positions->size() - known.size();
+  if (known.empty() || num_without == 0) return;
+  const double radius = Median(std::move(known));
+  for (KnownPosition& position : *positions) {
+    Ellipsoid& region = position.region;
+    if (!(region.semi_axes.minCoeff() > 0))
+      region.semi_axes.setConstant(radius);
+  }
+  if (!on_note) return;
+  std::ostringstream text;
+  text << num_without << " of " << positions->size()
+       << " positions have no radius or covariance that can be used: they take "
+          "the median of the others' radii, "
+       << radius;
+  on_note(text.str());
+}
+
+}  // namespace
+
 KnownPositions ReadKnownPositions(const PositionFiles& files,
                                   const Model& model, const FileNote& on_note) {
   const PositionsOptions options{files.radius, on_note, files.have_own_frame};
@@ -277,6 +314,7 @@ KnownPositions ReadKnownPositions(const PositionFiles& files,
     known.positions.insert(known.positions.end(), of_points.begin(),
                            of_points.end());
   }
+  CompleteRadii(files.radius, on_note, &known.positions);
   if (!options.has_own_frame) return known;
   known.frame = FindPositionFrame(
       model, known.positions,

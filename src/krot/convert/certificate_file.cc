@@ -1,10 +1,8 @@
 #include "krot/convert/certificate_file.h"
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <set>
-#include <sstream>
 #include <utility>
 
 #include "krot/base/numbers.h"
@@ -12,6 +10,7 @@
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
 #include "krot/model/derived_models.h"
+#include "krot/model/model_io.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 
@@ -329,13 +328,7 @@ ConflictFile DescribeConflicts(
 }
 
 std::string ReadCertificateText(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  std::ostringstream text;
-  // This also fails for an empty file and for a folder.
-  if (!stream.is_open() || !(text << stream.rdbuf())) {
-    throw ModelError(path.string() + ": cannot be read, or is empty");
-  }
-  return text.str();
+  return ReadFileBytes(path).bytes;
 }
 
 CertificateFile ReadCertificateFile(const std::filesystem::path& path) {

@@ -97,9 +97,9 @@ inline bool IsDatabase(const FileBytes& file) {
 // Reads the pose priors in COLMAP's database (3.8 to 4.x) for the images of the
 // model, which are found by name. Latitudes and longitudes (WGS84) are
 // converted to metres east, north and up of one of them, the one nearest to
-// their median; `options.on_note` is told. If all priors have an invertible
-// covariance, a region is the ellipsoid of three standard deviations, which the
-// Gaussian leaves one time in thirty. Otherwise all regions are balls of
+// their median; `options.on_note` is told. The region of a prior with an
+// invertible covariance is the ellipsoid of three standard deviations, which
+// the Gaussian leaves one time in thirty. Those of others are balls of
 // options.radius, or of radius 0 without that. Priors that are not finite are
 // skipped. Throws ModelError if there are no priors, if they use several
 // coordinate systems, and for latitudes beyond a pole.

@@ -197,15 +197,11 @@ std::vector<KnownPosition> ReadPosePriors(const std::filesystem::path& path,
                   std::to_string(priors.size()) +
                   " pose priors in WGS84, expected all or none");
   }
-  const bool has_regions =
-      std::all_of(priors.begin(), priors.end(),
-                  [](const auto& prior) { return RegionOfPrior(prior); });
   std::vector<KnownPosition> positions;
   for (const PosePrior& prior : priors) {
-    positions.push_back(
-        {KnownPosition::Of::kImage, prior.image,
-         has_regions ? *RegionOfPrior(prior)
-                     : BallAround(prior.position, options.radius.value_or(0))});
+    positions.push_back({KnownPosition::Of::kImage, prior.image,
+                         RegionOfPrior(prior).value_or(BallAround(
+                             prior.position, options.radius.value_or(0)))});
   }
   return positions;
 }

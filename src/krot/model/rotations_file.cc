@@ -214,7 +214,7 @@ class Replacement {
     // t = -R C.
     frame->translation = RotationOf(rig_from_world) *
                          (frame->Rotation().transpose() * frame->translation);
-    frame->quaternion_wxyz = rig_from_world;
+    frame->quaternion_wxyz = ToWxyz(NormalizedQuaternion(rig_from_world));
     return true;
   }
 

@@ -5,11 +5,14 @@
 #include <utility>
 #include <vector>
 
+#include "krot/analysis/model_input.h"
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/check.h"
 #include "krot/model/derived_models.h"
 #include "krot/model/model_io.h"
+#include "krot/model/rigs.h"
+#include "krot/pipeline/stages.h"
 
 namespace krot::internal {
 namespace {
@@ -212,6 +215,40 @@ AdjustModelResult AdjustInFrame(const Model& model,
 
 }  // namespace
 
+FixedPositions CheckFixedPositions(
+    const Model& model, const FixedParts& fixed,
+    const std::vector<KnownPosition>& positions) {
+  FixedPositions found;
+  if (!fixed.Any() || positions.empty()) return found;
+  const auto text = [](const Eigen::Vector3d& x) {
+    std::ostringstream numbers;
+    numbers.precision(9);
+    numbers << x.transpose();
+    return numbers.str();
+  };
+  const std::vector<ImageGeometry> images = ImageGeometries(model);
+  for (const KnownPosition& position : positions) {
+    const auto place = PlaceOf(model, images, position);
+    const bool is_fixed =
+        position.of == KnownPosition::Of::kPoint3D
+            ? fixed.HasPoint(position.index)
+            : place && fixed.HasFrame(images[position.index].frame);
+    if (!is_fixed) continue;
+    const Ellipsoid& region = position.region;
+    const double ratio =
+        (region.UnitFromWorld() * (*place - region.centre)).norm();
+    if (!(ratio <= 1 + kKeptPosition)) {
+      throw ModelError(
+          "found " + NameOf(model, position) + " fixed at " + text(*place) +
+          ", expected it within the radius around " + text(region.centre) +
+          ", its known position; let it move, or correct that");
+    }
+    ++found.count;
+    found.largest_ratio = std::max(found.largest_ratio, ratio);
+  }
+  return found;
+}
+
 AdjustModelResult AdjustModel(const Model& model,
                               const AdjustModelOptions& options,
                               const Context& context) {
@@ -220,6 +257,7 @@ AdjustModelResult AdjustModel(const Model& model,
                   *options.max_error_factor, "> 1");
   }
   const BundleAdjustmentOptions& known = options.adjustment;
+  CheckFixedPositions(model, known.fixed, known.positions);
   const LocalFrame frame(model, known.fixed, known.positions);
   AdjustModelOptions local_options = options;
   local_options.adjustment.positions = frame.ToLocal(known.positions);

@@ -350,6 +350,16 @@ SolveModelResult SolveInFrame(const Model& model,
       (summary.collapse.IsWhole() || summary.worse_images_side ||
        IsWorse(Counted(roles, before_px), Counted(roles, after_px), allowed,
                context))) {
+    if (options.init == SolveInit::kFeasible && !context.IsCancelled()) {
+      SolveModelOptions own = options;
+      own.init = SolveInit::kModel;
+      own.on_built = nullptr;
+      const BuiltProblem built = OwnStart(model, own, context).built;
+      if (HasOwnStart(built) && built.NumPixels() >= start.built.NumPixels()) {
+        context.Note("no better than the input; from the model's positions");
+        return SolveInFrame(model, own, context);
+      }
+    }
     summary.is_given_back = true;
     summary.loose = {};
     summary.finish.reset();

@@ -355,15 +355,21 @@ SolveModelResult SolveModel(const Model& model,
     return SolveWithInflatedPositions(model, options, context);
   }
   const BuildProblemOptions& known = options.problem;
+  const FixedPositions fixed =
+      CheckFixedPositions(model, known.fixed, known.positions);
   const LocalFrame frame(model, known.fixed, known.positions);
   SolveModelOptions local_options = options;
   local_options.problem.positions = frame.ToLocal(known.positions);
   SolveModelResult result = InLocalFrame(frame, model, [&](const Model& local) {
     return SolveInFrame(local, local_options, context);
   });
-  if (result.summary.certificate) {
-    PlaceFixed(model, &*result.summary.certificate);
-    PlaceKnown(model, known.positions, &*result.summary.certificate);
+  SolveSummary& summary = result.summary;
+  summary.num_positions += fixed.count;
+  summary.largest_position_ratio =
+      std::max(summary.largest_position_ratio, fixed.largest_ratio);
+  if (summary.certificate) {
+    PlaceFixed(model, &*summary.certificate);
+    PlaceKnown(model, known.positions, &*summary.certificate);
   }
   return result;
 }

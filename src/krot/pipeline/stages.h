@@ -30,6 +30,18 @@ struct SolveRun {
   const Timer& timer;  // since the solve's start
 };
 
+// The known positions of what must not move.
+struct FixedPositions {
+  int64_t count = 0;
+  double largest_ratio =
+      0;  // of a distance from a known position to its radius
+};
+
+// Throws ModelError for what stands outside its known position (by more than
+// kKeptPosition) and must not move. O(images + positions).
+FixedPositions CheckFixedPositions(const Model& model, const FixedParts& fixed,
+                                   const std::vector<KnownPosition>& positions);
+
 // SolveModel in the coordinates of the model as they are. SolveModel calls it
 // with a model that was moved to a local frame near the origin if necessary.
 SolveModelResult SolveInFrame(const Model& model,
