@@ -14,10 +14,10 @@
 
 namespace krot {
 
-// Finds images and observations of a model that are wrong: either the
-// observations contradict each other by more than their noise or, with a
-// database, its verified matches contradict the poses. Not seen: wrong matches
-// that agree with the model, as those of duplicate structures do.
+// Finds images and observations that are wrong: they contradict each other by
+// more than noise or, with a database, its verified matches contradict the
+// poses. Not seen: wrong matches that agree with the model, as those of
+// duplicate structures.
 
 // ---- Noise ----
 
@@ -26,25 +26,22 @@ namespace krot {
 //
 // The cameras stay, and every point is moved to the least squares of its track.
 // There an observation's error is e = R (noise), with R = I - A (A'A)^-1 A' and
-// A the derivatives of the track's pixels by the point. An observation in a
-// track of two shows a half of its error, one in a track of twenty nearly all
-// of it. To make errors comparable, each is standardised:
+// A the derivatives of the track's pixels by the point: in a track of two it is
+// a half, in one of twenty nearly all. To be comparable, each is standardised:
 //
 //   w^2 = e_i' (sigma^2 R_ii)^-1 e_i,
 //
 // which is chi^2 with two degrees of freedom for Gaussian noise of standard
 // deviation sigma per axis. A direction in which R_ii is nearly 0 shows
 // nothing: it is left out and called uncontrolled, which does not mean sound.
-// Cameras are taken to be exact, as hundreds of observations see each of them;
-// this makes w a little too small.
+// Cameras are taken to be exact, which makes w a little too small.
 
 struct NoiseOptions {
   // The probability that a model with Gaussian noise alone has an observation
   // above the critical value; in (0, 1).
   double false_alarm = 0.05;
   // The standard deviation of every observation's noise, relative to sigma, by
-  // track element; > 0. Empty: it is the same for all. Useful because the noise
-  // of keypoints grows with their scale.
+  // track element; > 0. Empty: it is the same for all.
   std::vector<double> relative_sigmas;
   // Observations to ignore, by track element. Empty: none.
   std::vector<char> is_left_out = {};
@@ -53,8 +50,7 @@ struct NoiseOptions {
   std::optional<double> sigma_px = {};
 };
 
-// The noise of an observation, with its point at the least squares of its
-// track.
+// With the point at the least squares of its track.
 struct ObservationNoise {
   Eigen::Vector2d error_px = Eigen::Vector2d::Zero();  // projected - measured
   // The eigenvalues of R_ii, ascending, in [0, 1]: the share of the noise's
@@ -138,9 +134,8 @@ struct PixelMap {
   Eigen::Matrix<double, 2, 3> image_from_camera;
 };
 
-// How a model's numbers differ from COLMAP's, because they come from a program
-// that writes the same things otherwise, or because some are those of other
-// photos.
+// How a model's numbers differ from COLMAP's, as another program writes them
+// otherwise, or as some are those of other photos.
 struct Conventions {
   PoseConventions poses;  // of images; in rigs, those of frames
   // Of the other sensors in a rig, which is their world; it has the file's
@@ -149,17 +144,16 @@ struct Conventions {
   // What translations of sensors must be multiplied by, as rigs are written in
   // another unit than the world.
   double rig_factor = 1;
-  // What focal lengths, principal points and image sizes must be multiplied by,
-  // as they are those of photos of another size than the 2D points.
+  // What focal lengths, principal points and image sizes must be multiplied by:
+  // they are those of photos of another size.
   double intrinsics_factor = 1;
   bool has_central_principal_point = false;  // though the file says otherwise
-  // Takes the axes of the file's 2D points to COLMAP's, x right and y down, as
-  // others count from another corner of the photo, or rows first.
+  // Takes the axes of the file's 2D points, which may count from another corner
+  // or rows first, to COLMAP's.
   Eigen::Matrix2d pixel_from_file_axes = Eigen::Matrix2d::Identity();
   // The 3D points are not where their images see them.
   bool has_wrong_points = false;
-  // Where cameras or 2D points are not the images', while poses and 3D points
-  // are right.
+  // Where cameras or 2D points are wrong, and poses and 3D points are right.
   std::vector<PixelMap> pixel_maps;
 
   // Median reprojection errors of a sample of the model's tracks, pixels: as it
@@ -212,9 +206,8 @@ enum class ImageVerdict {
   kWrong,
 };
 
-// Why an image is wrong. Noise up to three times the model's, as in a blurred
-// photo, is not a fault, unless too few observations are left to tell it from
-// kChance.
+// Why an image is wrong. Noise up to three times the model's is no fault,
+// unless too few observations are left to tell it from kChance.
 enum class ImageFault {
   kNone,
   kMatches,  // the matches of its pairs contradict its pose (CheckPairs)
@@ -264,8 +257,7 @@ struct WrongObservation {
   double w = 0;  // infinite: the point is in the camera, or not before it
   // Distance from where the rest of its track puts the point; or NaN.
   double error_px = 0;
-  // Both observations of a track of two are listed: nothing tells which is
-  // wrong.
+  // Of a track of two both are listed: nothing tells which is wrong.
   bool is_of_two = false;
 };
 
@@ -277,8 +269,8 @@ struct TwoPointTrack {
   Eigen::Vector3d second = Eigen::Vector3d::Zero();
 };
 
-// Images that too few tracks tie to the rest of the model: as a whole, they may
-// be elsewhere, turned, larger or smaller, and no error would show it.
+// Images that too few tracks tie to the rest: as a whole, they may be
+// elsewhere, turned, larger or smaller, and no error would show it.
 struct ModelPart {
   std::vector<int32_t> images;  // in ModelCheck::images, ascending
   // Tracks that images of both sides see, wrong observations not counted.
@@ -308,8 +300,7 @@ struct WrongCamera {
   CameraId camera_id = 0;
   CameraFault fault = CameraFault::kFocalLength;
   int64_t num_images = 0;
-  // By how much the squared errors of all images fall, relative to those of the
-  // camera's own, to first order; in [0, 1].
+  // Fall of all squared errors by those of its images, to first order; [0, 1].
   double gain = 0;
   // The mean focal length, as it is and as the images ask for, pixels.
   double focal_length_px = 0;
@@ -338,9 +329,8 @@ struct ModelCheck {
   std::optional<Conventions> conventions;
   std::optional<PairCheck> pairs;  // with a database
   // Standard deviation of the noise per axis, pixels; with keypoint scales, for
-  // the median scale. None if no observation is checked by another one, as in a
-  // model without positions or tracks: then only matches can tell what is
-  // wrong.
+  // the median scale. None if no observation is checked by another one: then
+  // only matches can tell what is wrong.
   std::optional<double> sigma_px;
   // A Cauchy loss for the observations that are not wrong; none if the tails of
   // their errors are no heavier than Gaussian ones.
@@ -348,16 +338,14 @@ struct ModelCheck {
   std::optional<double> median_scale_px;  // where keypoint scales are known
   double critical_w = 0;
   // Whether most images stand where their own errors would put them, up to half
-  // of an image's noise, and most points where these see them. If not, no image
-  // can be called misplaced, and the model should be adjusted first.
+  // of an image's noise, and most points where these see them. If not, adjust
+  // the model first; no image is called misplaced.
   bool is_adjusted = true;
   // Whether sigma_px is within the 4 px of COLMAP's filter or a hundredth of
-  // the photos' size. If not, cameras, 2D points and tracks are hardly those of
-  // the same images, and nothing else that is said counts.
+  // the photos' size. If not, nothing else that is said counts.
   bool fits = true;
-  // If there are any, observations and images may look wrong only because of
-  // them: the model should be adjusted with what is wrong free, and be checked
-  // again. The largest gain first.
+  // Observations and images may look wrong only because of them: adjust the
+  // model with what is wrong free, and check it again. The largest gain first.
   std::vector<WrongCamera> cameras;
   int64_t num_tested = 0;          // observations of images that are not wrong
   std::vector<ImageCheck> images;  // as Model::images
@@ -382,16 +370,14 @@ struct ModelCheck {
   }
 };
 
-// Finds what is wrong in a model; docs/method/outliers.md describes the tests.
-// A model in other conventions is converted to COLMAP's. Then it compares the
-// database's matches with the poses, leaves out the images that these call
-// wrong and snoops: in each track the observation with the largest w is
-// removed, until none is above the critical value. The image with the strongest
-// evidence against it is called wrong if one of the tests of ImageFault says
-// so; over all images of a sound model the probability of that is false_alarm.
-// All this is repeated without the image until none is wrong, so that no image
-// is blamed for its neighbour. Requires a valid model. The same bits at any
-// number of threads.
+// Finds what is wrong in a model (docs/method/outliers.md). A model in other
+// conventions is converted to COLMAP's. Then the images go that the database's
+// matches call wrong, and in each track the observation with the largest w,
+// until none is above the critical value. The image with the strongest evidence
+// against it is called wrong if one of the tests of ImageFault says so; over
+// all images of a sound model the probability of that is false_alarm. All this
+// is repeated without the image, so that none is blamed for its neighbour.
+// Requires a valid model. The same bits at any number of threads.
 ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options = {},
                       const Context& context = {});
 
@@ -400,14 +386,13 @@ struct ModelCure {
   std::vector<std::string> moved;  // names of the images that were moved
 };
 
-// A copy in COLMAP's conventions without wrong observations and images. If only
-// the position of an image is wrong, according to its matches, it is moved to
-// where these fit best (CheckedImage::moved_cam_from_world) and kept, unless
-// something calls it wrong there as well. Images that share their frame with
-// others are not moved, as these would move along. All other cameras stay.
-// Points that lose observations move to the least squares of the rest; stored
-// errors are updated. A bitwise copy if nothing is wrong. `check` must come
-// from CheckModel with these options.
+// A copy in COLMAP's conventions without wrong observations and images. An
+// image whose position alone is wrong by its matches is moved to where these
+// fit best (CheckedImage::moved_cam_from_world), unless it is wrong there as
+// well or others share its frame. All other cameras stay. Points that lose
+// observations move to the least squares of the rest; stored errors are
+// updated. A bitwise copy if nothing is wrong. `check` must come from
+// CheckModel with these options.
 ModelCure CureModel(const Model& model, const ModelCheck& check,
                     const ModelCheckOptions& options = {},
                     const Context& context = {});
