@@ -268,7 +268,7 @@ TEST_F(BundleAdjuster, TakesNoMoreIterationsThanAllowedWithKnownPositions) {
 TEST_F(BundleAdjuster, SaysThatNoKnownPositionTookPart) {
   const std::string held = Load(folder_ / "input").images[0].name;
   std::ofstream(folder_ / "held.txt") << held << '\n';
-  std::ofstream(folder_ / "gps.txt") << held << " 1 2 3 1\n";
+  std::ofstream(folder_ / "gps.txt") << held << " 1 2 3 1000\n";
   const KrotResult result =
       Succeeded(Adjust({"--positions_path", folder_ / "gps.txt",
                         "--fixed_images_path", folder_ / "held.txt"}));
