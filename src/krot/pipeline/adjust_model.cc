@@ -223,9 +223,17 @@ AdjustModelResult AdjustModel(const Model& model,
   const LocalFrame frame(model, known.fixed, known.positions);
   AdjustModelOptions local_options = options;
   local_options.adjustment.positions = frame.ToLocal(known.positions);
-  return InLocalFrame(frame, model, [&](const Model& local) {
-    return AdjustInFrame(local, local_options, context);
-  });
+  AdjustModelResult result =
+      InLocalFrame(frame, model, [&](const Model& local) {
+        return AdjustInFrame(local, local_options, context);
+      });
+  if (frame.IsModels()) return result;
+  // The way back from the local frame rounds.
+  const std::vector<double> errors_px =
+      PixelErrors(result.model, context.num_threads);
+  UpdatePointErrors(errors_px, &result.model);
+  result.summary.pixel_error_after = Summarize(errors_px);
+  return result;
 }
 
 }  // namespace krot::internal
