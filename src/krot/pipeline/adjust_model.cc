@@ -178,9 +178,17 @@ AdjustModelResult AdjustInFrame(const Model& model,
   if (is_bounded) {
     start = BoundedStart(model, options, context, &summary);
     if (!start) {
-      summary.adjustment.termination =
-          context.IsCancelled() ? BundleAdjustmentTermination::kInterrupted
-                                : BundleAdjustmentTermination::kInfeasibleStart;
+      // Says whether there is nothing to adjust at all.
+      adjustment = {};
+      adjustment.max_num_iterations = 0;
+      adjustment.min_track_length = options.adjustment.min_track_length;
+      summary.adjustment = AdjustBundle(model, adjustment, context).summary;
+      if (summary.adjustment.num_observations > 0) {
+        summary.adjustment.termination =
+            context.IsCancelled()
+                ? BundleAdjustmentTermination::kInterrupted
+                : BundleAdjustmentTermination::kInfeasibleStart;
+      }
       result.model = model;
       return result;
     }
