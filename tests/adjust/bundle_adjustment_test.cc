@@ -633,6 +633,35 @@ TEST(AdjustBundle, LeavesOutWhatIsBehindItsCamera) {
             num_behind);
 }
 
+TEST(AdjustBundle, EndsNoWorseWhereAPointLiesNextToACamera) {
+  Model model = SynthesizeScene(SmallOptions()).model;
+  const std::vector<ImageGeometry> images = ImageGeometries(model);
+  const auto image_of = ImageIndices(model);
+  Point3D& point = model.points3D[0];
+  const TrackElement& first = model.track_elements[point.track_begin];
+  const RigidTransform& pose =
+      images[image_of.at(first.image_id)].cam_from_world;
+  point.xyz = Center(pose) + 1e-12 * pose.rotation.row(2).transpose();
+  // All others see it where it lies.
+  for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+    const TrackElement& element = model.track_elements[e];
+    const int32_t n = image_of.at(element.image_id);
+    const Eigen::Vector3d x_cam = images[n].cam_from_world * point.xyz;
+    const Eigen::Vector2d pixel =
+        ProjectRay(model.cameras[images[n].camera], x_cam.hnormalized());
+    Point2D& point2D = model.images[n].points2D[element.point2D_idx];
+    point2D.x = pixel.x();
+    point2D.y = pixel.y();
+  }
+  const double cost = CostOf(model);
+  BundleAdjustmentOptions options;
+  options.max_num_iterations = 0;
+  EXPECT_NEAR(CostOf(AdjustBundle(model, options, kAdjustAlone).model), cost,
+              1e-9 * cost);
+  options.max_num_iterations = 3;
+  EXPECT_LT(CostOf(AdjustBundle(model, options, kAdjustAlone).model), cost);
+}
+
 TEST(AdjustBundle, GivesTheSameBitsAgainOnOneThread) {
   const Model model = SynthesizeScene(SmallOptions()).model;
   const Model a = AdjustBundle(model, Exact(), kAdjustAlone).model;

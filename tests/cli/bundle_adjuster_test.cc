@@ -46,6 +46,19 @@ TEST_F(BundleAdjuster, LowersTheRmsErrorAndReportsIt) {
   EXPECT_TRUE(report["max_error"].is_null());
 }
 
+TEST_F(BundleAdjuster, HasNothingToAdjustWithoutPosesWhateverTheCap) {
+  Model model = SmallLegacyModel();
+  for (Frame& frame : model.frames) frame.rig_from_world.quaternion_wxyz = {};
+  for (Image& image : model.images) image.cam_from_world.quaternion_wxyz = {};
+  Save(model, folder_ / "input");
+  for (const Words& cap :
+       {Words{}, Words{"--BundleAdjustment.max_error", "minimum"}}) {
+    const KrotResult result = Adjust(cap);
+    EXPECT_EQ(result.exit_code, 3);
+    EXPECT_THAT(result.err, HasSubstr("nothing to adjust: "));
+  }
+}
+
 TEST_F(BundleAdjuster, ReportsItsCourse) {
   for (const Words& cap :
        {Words{}, Words{"--BundleAdjustment.max_error_factor", "1.1"}}) {

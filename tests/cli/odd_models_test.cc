@@ -13,6 +13,7 @@
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
+#include "tests/testing/edit_model.h"
 
 namespace krot::internal {
 namespace {
@@ -139,6 +140,24 @@ TEST_F(OddModels, WithObservationsInAnImageOfNoRotationLeaveThemOut) {
                 HasSubstr("no_pose " + std::to_string(num_observations)));
     EXPECT_EQ(Load(folder_ / "output").images[0].cam_from_world.quaternion_wxyz,
               (QuaternionWxyz{0, 0, 0, 0}));
+  }
+}
+
+// Of errors whose squares no number holds nothing can be told.
+TEST_F(OddModels, BeyondAllPixelsAreRefusedByTheirPlace) {
+  const Model sound = SmallLegacyModel();
+  for (const bool is_camera : {false, true}) {
+    Model model = sound;
+    double& value =
+        is_camera ? model.cameras[0].params[0] : PixelOf(&model, 0).x;
+    value = 1e160;
+    Save(model, folder_ / "input");
+    for (const char* command :
+         {"bundle_adjuster", "outlier_filter", "model_checker"}) {
+      const KrotResult result = Run({command});
+      EXPECT_EQ(result.exit_code, 2) << command;
+      EXPECT_THAT(result.err, HasSubstr("1e+160, expected a finite number"));
+    }
   }
 }
 

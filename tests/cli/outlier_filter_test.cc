@@ -9,12 +9,29 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "krot/camera/camera_model.h"
 #include "krot/model.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
+#include "tests/testing/edit_model.h"
 
 namespace krot::internal {
 namespace {
+
+// The first track keeps one observation.
+Model WithFirstTrackOfOne(Model model) {
+  const uint64_t length = model.points3D[0].track_end;
+  for (uint64_t e = 1; e < length; ++e) {
+    PixelOf(&model, e).point3D_id = kInvalidPoint3DId;
+  }
+  model.track_elements.erase(model.track_elements.begin() + 1,
+                             model.track_elements.begin() + length);
+  for (Point3D& point : model.points3D) {
+    if (point.track_begin > 0) point.track_begin -= length - 1;
+    point.track_end -= length - 1;
+  }
+  return model;
+}
 
 class OutlierFilterCommand : public ::testing::Test {
  protected:
@@ -297,6 +314,38 @@ TEST_F(OutlierFilterCommand, WithoutABoundRemovesWhatNoiseDoesNotExplain) {
                 .exit_code,
             1);
   EXPECT_EQ(Filter({"--OutlierFilter.method", "snooping"}).exit_code, 1);
+}
+
+TEST_F(OutlierFilterCommand, FiltersPanoramasAsTheCheckerSuggests) {
+  SceneOptions options = SmallScene();
+  options.camera_model_id = FindCameraModel("EQUIRECTANGULAR")->id;
+  options.outlier_ratio = 0.01;
+  Save(SynthesizeScene(options).model, folder_ / "input");
+  const KrotResult check =
+      RunKrot({"model_checker", "--input_path", folder_ / "input"});
+  EXPECT_THAT(check.out, HasSubstr("krot outlier_filter --input_path"));
+  EXPECT_THAT(check.out, Not(HasSubstr("krot bundle_adjuster")));
+  Succeeded(WithoutABound({"--Solver.finish_loss", "cauchy"}));
+  const Json report = ReadJson(folder_ / "r.json");
+  EXPECT_GT(report["num_removed"], 0);
+  EXPECT_LT(report["pixel_error"]["after"]["rms"],
+            report["snooping"]["kept_error_before"]["rms"]);
+}
+
+TEST_F(OutlierFilterCommand, KeepsTracksOfOneThatItDoesNotJudge) {
+  for (const double outlier_ratio : {0.0, 0.03}) {
+    SceneOptions options = SmallScene();
+    options.outlier_ratio = outlier_ratio;
+    const Model alone = WithFirstTrackOfOne(SynthesizeScene(options).model);
+    Save(alone, folder_ / "input");
+    Succeeded(WithoutABound({}));
+    const Model output = Load(folder_ / "output");
+    EXPECT_EQ(output.points3D[0].track_end, 1);
+    EXPECT_EQ(output.points3D[0].xyz, alone.points3D[0].xyz);
+    if (outlier_ratio == 0) {
+      EXPECT_THAT(output, IsModel(alone));
+    }
+  }
 }
 
 }  // namespace

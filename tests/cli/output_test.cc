@@ -123,6 +123,14 @@ TEST_F(Output, AsTextWarnsOfNamesThatColmapWouldCut) {
   EXPECT_THAT(Solve(folder_ / "text", {"--output_type", "TXT"}).err,
               HasSubstr("warning: 1 image name with white space"));
   EXPECT_EQ(Load(folder_ / "text").images[0].name, "a photo.jpg");
+  for (const char* command :
+       {"bundle_adjuster", "outlier_filter", "model_checker"}) {
+    const KrotResult result = Succeeded(
+        RunKrot({command, "--input_path", folder_ / "input", "--output_path",
+                 folder_ / command, "--output_type", "TXT"}));
+    EXPECT_THAT(result.err, HasSubstr("warning: 1 image name with white space"))
+        << command;
+  }
 }
 
 TEST_F(Output, HoldsTheReportIfToldSo) {

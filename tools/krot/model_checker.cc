@@ -7,6 +7,7 @@
 #include "krot/check.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/database.h"
+#include "krot/model/derived_models.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/report/reports.h"
 #include "tools/krot/command.h"
@@ -153,6 +154,7 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
   const Model model =
       ReadInput(paths, log, &report.run, command.database_path.empty());
 
+  report.has_panorama = HasPanorama(model);
   std::optional<Database> database;
   ModelCheckOptions options;
   if (!command.database_path.empty()) {

@@ -323,11 +323,23 @@ void WarnOfConventions(const ModelPaths& paths, const Model& model,
               " krot model_checker --output_path writes it so");
 }
 
+void WarnOfWhiteSpace(const Model& model, const WriteModelOptions& options,
+                      const LogOptions& log) {
+  const std::vector<std::string> names = ImageNamesWithWhiteSpace(model);
+  if (names.empty() || options.format != ModelFormat::kText) return;
+  LogLine(log, 1,
+          "warning: " + Counted(names.size(), "image name") +
+              " with white space, at which COLMAP ends a name when it reads "
+              "text: '" +
+              names.front() + "' for one; --output_type BIN avoids that");
+}
+
 void WriteOutput(const Model& model, const ModelPaths& paths,
                  const WriteModelOptions& options, const LogOptions& log,
                  RunRecord* run) {
   BeginPhase(log, "writing " + paths.output_path);
   const Timer timer;
+  WarnOfWhiteSpace(model, options, log);
   WriteModel(model, paths.output_path, options);
   run->seconds_write = timer.Seconds();
 }

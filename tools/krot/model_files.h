@@ -102,7 +102,12 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
 void WarnOfConventions(const ModelPaths& paths, const Model& model,
                        const LogOptions& log);
 
-// Writes the model to paths.output_path, and to `run` how long that took.
+// Warns on stderr of image names at which COLMAP stumbles in text.
+void WarnOfWhiteSpace(const Model& model, const WriteModelOptions& options,
+                      const LogOptions& log);
+
+// Writes the model to paths.output_path, with that warning, and to `run` how
+// long that took.
 void WriteOutput(const Model& model, const ModelPaths& paths,
                  const WriteModelOptions& options, const LogOptions& log,
                  RunRecord* run);

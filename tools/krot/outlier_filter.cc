@@ -164,7 +164,7 @@ int Run(const OutlierCommand& command) {
         "krot solver makes them, and --OutlierFilter.max_error PX filters "
         "without");
   }
-  if (result.model.track_elements.empty()) {
+  if (!HasTrack(result.model)) {
     throw CommandError(kExitNothingToSolve,
                        "nothing to solve: no track keeps two observations");
   }

@@ -290,17 +290,6 @@ void PointToOutlierFilter(const LogOptions& log, const SolveReport& report) {
               "outlier_filter removes them");
 }
 
-void WarnOfWhiteSpace(const LogOptions& log, const Model& model) {
-  const std::vector<std::string> names = ImageNamesWithWhiteSpace(model);
-  if (names.empty()) return;
-  LogLine(
-      log, 1,
-      "warning: " + Counted(static_cast<int64_t>(names.size()), "image name") +
-          " with white space, at which COLMAP ends a name when it reads "
-          "text: '" +
-          names.front() + "' for one; --output_type BIN avoids that");
-}
-
 }  // namespace
 
 int RunSolveCommand(const SolveCommand& command) {
@@ -346,9 +335,7 @@ int RunSolveCommand(const SolveCommand& command) {
     return kExitDone;
   }
 
-  if (write_options.format == ModelFormat::kText) {
-    WarnOfWhiteSpace(log, solved);
-  }
+  WarnOfWhiteSpace(solved, write_options, log);
   MeasureSolved(solved, log, &report);
   BeginPhase(log, "writing " + paths.output_path);
   const Timer write_timer;

@@ -1,6 +1,7 @@
 #include "krot/adjust/adjustment_blocks.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <numeric>
@@ -29,10 +30,12 @@ void CheckImagePlane(const Camera& camera) {
 }
 
 bool IsUsable(const ImageGeometry& geometry, const Camera& camera,
-              const Vector3d& xyz) {
+              const Vector3d& xyz, const Point2D& pixel) {
   const Vector3d x_cam = geometry.cam_from_world * xyz;
   if (!(x_cam.z() > 0)) return false;
-  return ProjectRay(camera, x_cam.hnormalized()).allFinite();
+  const Eigen::Vector2d projected = ProjectRay(camera, x_cam.hnormalized());
+  return std::isfinite(
+      (projected - Eigen::Vector2d(pixel.x, pixel.y)).squaredNorm());
 }
 
 void CollectObservations(const Model& model, int min_track_length,
@@ -53,12 +56,12 @@ void CollectObservations(const Model& model, int min_track_length,
       const ImageGeometry& geometry = images[n];
       const Camera& camera = model.cameras[geometry.camera];
       CheckImagePlane(camera);
+      const Point2D& pixel = model.images[n].points2D[element.point2D_idx];
       if (!geometry.has_pose) {
         ++blocks->num_no_pose;
-      } else if (!IsUsable(geometry, camera, point.xyz)) {
+      } else if (!IsUsable(geometry, camera, point.xyz, pixel)) {
         ++blocks->num_behind;
       } else {
-        const Point2D& pixel = model.images[n].points2D[element.point2D_idx];
         blocks->observations.push_back({geometry.frame,
                                         SensorBlock(geometry, sensor_offsets),
                                         geometry.camera,

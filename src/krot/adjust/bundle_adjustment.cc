@@ -15,6 +15,7 @@
 #include "krot/base/check.h"
 #include "krot/base/context.h"
 #include "krot/base/parallel_for.h"
+#include "krot/problem/cost.h"
 
 namespace krot::internal {
 namespace {
@@ -365,7 +366,16 @@ BundleAdjustmentResult AdjustBundle(
     } else {
       Minimize(recorded, context, &blocks, &summary);
     }
-    RestoreSimilarity(options, before, &blocks);
+    AdjustmentBlocks restored = blocks;
+    RestoreSimilarity(options, before, &restored);
+    // A point next to a camera may lose its digits.
+    const auto restored_cost = RobustCost(context, loss.get(), restored);
+    if (restored_cost &&
+        (IsZeroUpToRounding(std::sqrt(*restored_cost) -
+                            std::sqrt(summary.cost_final)) ||
+         *restored_cost <= (1 + kErrorRounding) * summary.cost_final)) {
+      blocks = std::move(restored);
+    }
   }
   result.model = ApplyBlocks(model, before, blocks);
   if (precision != nullptr && summary.num_parameters > 0 && cost) {

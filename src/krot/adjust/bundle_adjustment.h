@@ -122,8 +122,9 @@ struct BundleAdjustmentResult {
 // After it, every connected component without anything fixed is moved so that
 // it has its former centroid of camera centres, their former RMS distance to it
 // (unless a constant rig baseline fixes the scale) and its former mean
-// rotation. Cameras that ran away do not count (krot/geometry/transform.h).
-// Stored point errors are not updated.
+// rotation, unless that would raise the cost by rounding. Cameras that ran away
+// do not count (krot/geometry/transform.h). Stored point errors are not
+// updated.
 //
 // A step that takes a point behind a camera that sees it is rejected; with a
 // cap, so is a step that takes an error to the cap. With a cap the result has

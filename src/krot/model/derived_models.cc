@@ -9,6 +9,7 @@
 
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
+#include "krot/camera/camera_model.h"
 #include "krot/geometry/transform.h"
 #include "krot/model/rigs.h"
 
@@ -85,7 +86,8 @@ ModelShare TakeShare(const Model& whole, const std::vector<int32_t>& points) {
 }
 
 RemovedObservations RemoveObservations(const Model& model,
-                                       const std::vector<char>& is_removed) {
+                                       const std::vector<char>& is_removed,
+                                       bool drops_short) {
   CheckArgument(is_removed.size() == model.track_elements.size(),
                 "is_removed.size()", is_removed.size(),
                 "the number of track elements");
@@ -103,7 +105,9 @@ RemovedObservations RemoveObservations(const Model& model,
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
       num_kept += !is_removed[e];
     }
-    const bool goes = num_kept < 2;
+    const auto length =
+        static_cast<int64_t>(point.track_end - point.track_begin);
+    const bool goes = num_kept < 2 && (num_kept < length || drops_short);
     if (goes) {
       ++result.num_points;
       result.num_left_alone += num_kept;
@@ -132,6 +136,13 @@ RemovedObservations RemoveObservations(const Model& model,
     result.model.points3D.push_back(kept);
   }
   return result;
+}
+
+bool HasPanorama(const Model& model) {
+  return std::any_of(
+      model.cameras.begin(), model.cameras.end(), [](const Camera& camera) {
+        return !FindCameraModel(camera.model_id)->has_image_plane;
+      });
 }
 
 Model RemoveImages(const Model& model, const std::vector<char>& is_removed) {

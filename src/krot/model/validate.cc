@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/context.h"
 #include "krot/model.h"
@@ -40,12 +41,17 @@ template <typename... Parts>
   throw ModelError(message.str());
 }
 
-// Fails unless the value is finite; `owner()` names the record that it belongs
-// to.
+// Sums of squared errors of pixels would not be finite.
+constexpr double kTooLarge = 1e100;
+
+// Fails unless the value is finite and below the limit; `owner()` names the
+// record that it belongs to.
 template <typename Owner>
-void CheckFinite(double value, const Owner& owner, const char* quantity) {
-  if (std::isfinite(value)) return;
-  Fail(owner(), ": found ", quantity, " ", value, ", expected a finite number");
+void CheckFinite(double value, const Owner& owner, const char* quantity,
+                 double limit = kInfinity) {
+  if (std::abs(value) < limit) return;
+  Fail(owner(), ": found ", quantity, " ", value, ", expected a finite number",
+       limit == kInfinity ? "" : " below 1e100");
 }
 
 // Advice at the end of messages about inconsistent rigs and frames.
@@ -208,10 +214,10 @@ void CheckTrackElement(const IndexedModel& model, const Point3D& point,
   }
   const Point2D& pixel = image.points2D[element.point2D_idx];
   for (const double value : {pixel.x, pixel.y}) {
-    if (std::isfinite(value)) continue;
+    if (std::abs(value) < kTooLarge) continue;
     Fail("3D point ", point.id, ": found 2D point ", element.point2D_idx,
          " of ", Describe(image), " in its track, a coordinate of which is ",
-         value, ", expected a finite number");
+         value, ", expected a finite number below 1e100");
   }
 }
 
@@ -249,7 +255,7 @@ void CheckCamera(const Camera& camera) {
          info->num_params, " for ", info->name, " (", info->param_names, ")");
   }
   for (const double param : camera.params) {
-    CheckFinite(param, owner, "the parameter");
+    CheckFinite(param, owner, "the parameter", kTooLarge);
   }
 }
 

@@ -29,7 +29,7 @@ class SnoopingFilter : private Filtering {
                  const Context& context)
       : Filtering(model, options, context) {
     w_.assign(model.track_elements.size(), 0);
-    kept_ = RemoveObservations(model, is_removed_);
+    kept_ = RemoveObservations(model, is_removed_, false);
   }
 
   OutlierFilterResult Run() {
@@ -88,10 +88,20 @@ class SnoopingFilter : private Filtering {
   void MoveToLeastSquares() {
     const Timer timer;
     context_.Stage("solving what is left");
-    Context alone = context_;
-    alone.num_threads = 1;  // Ceres' sums depend on it
-    PolishModel(Polish::kRotationsFixed, options_.solve.finish.loss, {}, alone,
-                &kept_.model);
+    if (HasPanorama(kept_.model)) {  // which Ceres does not adjust
+      SolveModelOptions options = options_.solve;
+      options.init = SolveInit::kModel;
+      options.polish = Polish::kNone;
+      const std::vector<double> errors =
+          PixelErrors(kept_.model, context_.num_threads);
+      options.finish.max_error = 1 + 2 * Summarize(errors).max;
+      kept_.model = SolveModel(kept_.model, options, context_).model;
+    } else {
+      Context alone = context_;
+      alone.num_threads = 1;  // Ceres' sums depend on it
+      PolishModel(Polish::kRotationsFixed, options_.solve.finish.loss, {},
+                  alone, &kept_.model);
+    }
     ++summary_.num_solves;
     summary_.seconds_solve += timer.Seconds();
   }
@@ -105,17 +115,22 @@ class SnoopingFilter : private Filtering {
     double cost_before = 0, cost = 0;
     for (const uint64_t e : kept_.element_of) {
       before.push_back(errors_before_[e]);
-      cost_before += loss.Value(before.back() * before.back());
     }
-    for (const double error : PixelErrors(kept_.model, context_.num_threads)) {
-      cost += loss.Value(error * error);
+    const std::vector<double> after =
+        PixelErrors(kept_.model, context_.num_threads);
+    for (const Point3D& point : kept_.model.points3D) {
+      if (point.track_end - point.track_begin < 2) continue;  // not judged
+      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+        cost_before += loss.Value(before[e] * before[e]);
+        cost += loss.Value(after[e] * after[e]);
+      }
     }
     summary_.snooping->kept_error_before = Summarize(before);
     bool& is_solved = summary_.snooping->is_solved;
     is_solved = cost <= cost_before &&
                 !FindCollapse(model_, kept_.model, context_).IsWhole();
     if (is_solved) return;
-    kept_ = RemoveObservations(model_, is_removed_);
+    kept_ = RemoveObservations(model_, is_removed_, false);
   }
 
   // Sets a bound for each observation, and looks for conflicts of the removed

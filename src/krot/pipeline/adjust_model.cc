@@ -181,9 +181,17 @@ AdjustModelResult AdjustInFrame(const Model& model,
   if (is_bounded) {
     start = BoundedStart(model, options, context, &summary);
     if (!start) {
-      summary.adjustment.termination =
-          context.IsCancelled() ? BundleAdjustmentTermination::kInterrupted
-                                : BundleAdjustmentTermination::kInfeasibleStart;
+      // Says whether there is nothing to adjust at all.
+      adjustment = {};
+      adjustment.max_num_iterations = 0;
+      adjustment.min_track_length = options.adjustment.min_track_length;
+      summary.adjustment = AdjustBundle(model, adjustment, context).summary;
+      if (summary.adjustment.num_observations > 0) {
+        summary.adjustment.termination =
+            context.IsCancelled()
+                ? BundleAdjustmentTermination::kInterrupted
+                : BundleAdjustmentTermination::kInfeasibleStart;
+      }
       result.model = model;
       return result;
     }
@@ -261,9 +269,17 @@ AdjustModelResult AdjustModel(const Model& model,
   const LocalFrame frame(model, known.fixed, known.positions);
   AdjustModelOptions local_options = options;
   local_options.adjustment.positions = frame.ToLocal(known.positions);
-  return InLocalFrame(frame, model, [&](const Model& local) {
-    return AdjustInFrame(local, local_options, context);
-  });
+  AdjustModelResult result =
+      InLocalFrame(frame, model, [&](const Model& local) {
+        return AdjustInFrame(local, local_options, context);
+      });
+  if (frame.IsModels()) return result;
+  // The way back from the local frame rounds.
+  const std::vector<double> errors_px =
+      PixelErrors(result.model, context.num_threads);
+  UpdatePointErrors(errors_px, &result.model);
+  result.summary.pixel_error_after = Summarize(errors_px);
+  return result;
 }
 
 }  // namespace krot::internal

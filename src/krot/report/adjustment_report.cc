@@ -5,6 +5,7 @@
 #include <sstream>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/report/report_json.h"
 #include "krot/report/sentences.h"
 #include "krot/report/text_table.h"
@@ -156,8 +157,8 @@ std::string NothingToAdjustSentence(const BundleAdjustmentSummary& summary) {
 
 std::string NoModelBelowCapSentence(const AdjustModelSummary& summary) {
   std::ostringstream text;
-  text << "no model with every error below " << *summary.max_error
-       << " px was found";
+  text << "no model with every error below "
+       << summary.max_error.value_or(kInfinity) << " px was found";
   if (!summary.start) return text.str();
   const PixelErrorStatistics& errors = summary.pixel_error_start;
   if (errors.not_finite > 0) {

@@ -74,12 +74,16 @@ std::string Folder(const std::string& name) {
   return "    mkdir -p " + name + "\n";
 }
 
-std::string RobustAdjustment(const std::string& model, double scale_px,
+std::string RobustAdjustment(const CheckReport& report, const std::string& in,
                              const std::string& more = "") {
-  return "    krot bundle_adjuster --input_path " + model +
-         " --output_path ADJUSTED --BundleAdjustmentCeres.loss_function_type "
-         "CAUCHY --BundleAdjustmentCeres.loss_function_scale " +
-         FormatLength(scale_px) + more + "\n";
+  const std::string words = " --input_path " + in + " --output_path ADJUSTED ";
+  return (report.has_panorama
+              ? "    krot outlier_filter" + words +
+                    "--Solver.finish_loss cauchy --Solver.finish_loss_scale "
+              : "    krot bundle_adjuster" + words +
+                    "--BundleAdjustmentCeres.loss_function_type CAUCHY "
+                    "--BundleAdjustmentCeres.loss_function_scale ") +
+         FormatLength(report.check.cauchy_scale_px.value_or(1)) + more + "\n";
 }
 
 // Suggests what to do next, in commands of COLMAP and KROT.
@@ -110,19 +114,17 @@ std::string NextSteps(const CheckReport& report) {
         " --output_path " + cured + "\n";
   }
   if (!check.is_adjusted) {
-    const bool is_center_held =
-        std::any_of(check.cameras.begin(), check.cameras.end(),
-                    [](const WrongCamera& camera) {
-                      return camera.fault == CameraFault::kPrincipalPoint;
-                    });
+    const auto off_center =
+        PointersIf(check.cameras, [](const WrongCamera& camera) {
+          return camera.fault == CameraFault::kPrincipalPoint;
+        });
     return text +
            "  Adjust the model with a loss that wrong observations do not bend "
            "(colmap bundle_adjuster of\n  COLMAP 4 has these options, too), "
-           "and "
-           "check it again:\n" +
+           "and check it again:\n" +
            RobustAdjustment(
-               is_converted ? cured : input, check.cauchy_scale_px.value_or(1),
-               TextIf(is_center_held,
+               report, is_converted ? cured : input,
+               TextIf(!off_center.empty(),
                       " --BundleAdjustment.refine_principal_point 1")) +
            "    krot model_checker --input_path ADJUSTED\n";
   }
@@ -150,7 +152,7 @@ std::string NextSteps(const CheckReport& report) {
       text +=
           "  Or, without a database, adjust the input with a loss that wrong "
           "observations do not bend:\n" +
-          RobustAdjustment(input, check.cauchy_scale_px.value_or(1));
+          RobustAdjustment(report, input);
     }
   }
   if (std::any_of(check.images.begin(), check.images.end(),
@@ -186,7 +188,7 @@ std::string NextSteps(const CheckReport& report) {
          "  Then adjust all that is left, with the loss that suits errors with "
          "such tails\n  (colmap bundle_adjuster of COLMAP 4 has these options, "
          "too):\n" +
-         RobustAdjustment(model, *check.cauchy_scale_px);
+         RobustAdjustment(report, model);
 }
 
 }  // namespace

@@ -101,7 +101,8 @@ struct CheckReport {
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;  // of the cured model
   std::vector<std::string> moved;          // ModelCure
-  double seconds_check = 0;                // wall clock
+  bool has_panorama = false;
+  double seconds_check = 0;  // wall clock
   // For the commands that NextSteps suggests; if empty, a name in capitals is
   // printed instead.
   std::string input_path;
