@@ -58,22 +58,31 @@ def mended(corner, rows):
 
 def off(model, maps, change, sizes):
     worst = 0
-    by_name = {image[2]: image[1] for image in model.images.values()}
-    own = {row[0]: [float(v) for v in row[4:]] for row in model.rows("cameras.txt")}
+    cameras = {row[0]: [float(v) for v in row[4:]] for row in model.rows("cameras.txt")}
+    camera_of = {image[2]: image[1] for image in model.images.values()}
+
+    def compare(camera, found, true):
+        nonlocal worst
+        w, h = sizes[camera]
+        for x, y in ((0, 0), (w, 0), (0, h), (w, h)):
+            pairs = zip(found(x, y), true(x, y, w, h))
+            worst = max(worst, *(abs(a - b) for a, b in pairs))
+
     for one in maps:
-        for camera in one["cameras"]:  # a ray's pixel by both intrinsics, undistorted
-            n = num_focal(model.cameras[str(camera["camera_id"])][0])
-            w, h = sizes[str(camera["camera_id"])]
-            for x, y in ((0, 0), (w, 0), (0, h), (w, h)):
-                true, now = own[str(camera["camera_id"])], camera["params"]
-                for i, v in enumerate((x, y)):
-                    ray = (v - true[n + i]) / true[min(i, n - 1)]
-                    worst = max(worst, abs(ray * now[min(i, n - 1)] + now[n + i] - v))
-        for name in [] if one["cameras"] or change is None else one["images"]:
-            w, h = sizes[by_name[name]]
-            for x, y in ((0, 0), (w, 0), (0, h), (w, h)):
-                back = mended(change(x, y, w, h), one["image_from_camera"])
-                worst = max(worst, abs(back[0] - x), abs(back[1] - y))
+        for camera in map(str, (row["camera_id"] for row in one["cameras"])):
+            was = cameras[camera]
+            now = next(row["params"] for row in one["cameras"] if str(row["camera_id"]) == camera)
+            n = num_focal(model.cameras[camera][0])
+
+            def seen(*pixel):  # the pixel of the same ray, undistorted
+                return [(v - was[n + i]) / was[min(i, n - 1)] * now[min(i, n - 1)] + now[n + i]
+                        for i, v in enumerate(pixel)]
+
+            compare(camera, seen, change or (lambda x, y, w, h: (x, y)))
+        for camera in set() if one["cameras"] else {camera_of[name] for name in one["images"]}:
+            compare(camera, lambda x, y: mended(change(x, y, *sizes[camera]),
+                                                one["image_from_camera"]),
+                    lambda x, y, w, h: (x, y))
     return worst
 
 
