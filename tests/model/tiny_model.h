@@ -15,7 +15,7 @@ namespace krot::internal {
 inline Model TinyModel() {
   Model model;
   model.cameras = {{7, 2, 640, 480, {500.1, 320, 240, -0.1}},
-                   {3, 1, 800, 600, {1.0 / 3, 5e-324, -0.0, 1e300}}};
+                   {3, 1, 800, 600, {1.0 / 3, 5e-324, -0.0, 1e99}}};
 
   Image first;
   first.id = 4000000000;

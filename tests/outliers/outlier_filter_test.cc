@@ -251,16 +251,6 @@ TEST(FilterOutliers, BySnoopingNeverRaisesWhatItKeeps) {
   }
 }
 
-// Where a writer had no 2D points, all errors can be 0.
-TEST(FilterOutliers, BySnoopingLetsNoSceneCollapse) {
-  Model model = SynthesizeScene(SceneOf(8, 60, 4, 0.5, 3)).model;
-  for (Image& image : model.images) {
-    for (Point2D& pixel : image.points2D) pixel.x = pixel.y = 0;
-  }
-  const OutlierFilterResult result = FilterOutliers(model, Snooping(), {});
-  EXPECT_FALSE(result.summary.snooping->is_solved);
-}
-
 TEST(FilterOutliers, BySnoopingProvesHowManyMustGo) {
   SceneOptions options = OutlierScene(7, 0.04, 200, 0.5);
   options.camera_model_id = 4;  // OPENCV

@@ -8,7 +8,6 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "krot/analysis/model_comparison.h"
 #include "krot/analysis/noise.h"
 #include "krot/base/context.h"
 #include "krot/convert/reprojection.h"
@@ -107,8 +106,7 @@ class SnoopingFilter : private Filtering {
   }
 
   // Where cameras hold points within rounding, the solves may end higher than
-  // the input, and where pixels are meaningless all points may fall together:
-  // then what is kept stays there.
+  // the input: then what is kept stays there.
   void StayIfBetter() {
     const ErrorLoss& loss = options_.solve.finish.loss;
     std::vector<double> before;
@@ -126,10 +124,8 @@ class SnoopingFilter : private Filtering {
       }
     }
     summary_.snooping->kept_error_before = Summarize(before);
-    bool& is_solved = summary_.snooping->is_solved;
-    is_solved = cost <= cost_before &&
-                !FindCollapse(model_, kept_.model, context_).IsWhole();
-    if (is_solved) return;
+    summary_.snooping->is_solved = cost <= cost_before;
+    if (cost <= cost_before) return;
     kept_ = RemoveObservations(model_, is_removed_, false);
   }
 
