@@ -55,6 +55,7 @@ std::vector<Sights> SightsOfImages(
   std::vector<int64_t> passed(model.images.size(), 0);
   std::vector<Sights> sights(model.images.size());
   for (const Point3D& point : model.points3D) {
+    if (point.track_end - point.track_begin < 2) continue;  // says nothing
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
       const int32_t n = image_of[e];
       const ImageGeometry& geometry = geometries[n];
