@@ -184,11 +184,11 @@ struct Conventions {
 // database if it has none, fit: their median error falls to a quarter or less
 // of what it is as COLMAP reads the model, even with points where their images
 // see them, and to a hundredth or less of the photo's size; or points alone are
-// wrong, and with others it is within 4 px. None for a model whose median error
-// is within the 4 px to which COLMAP's mapper filters, or that fits no other
-// way. In rigs, the images of reference sensors say how frames are written, and
-// then all others how sensors are. Requires a valid model. Milliseconds for a
-// sound model, up to a few seconds otherwise.
+// wrong, and with others it is within 4 px. Pixel maps are asked before, of
+// images with more than 4 px, the bound of COLMAP's filter. None if nothing
+// differs, or nothing fits. In rigs, reference sensors' images say how frames
+// are written, and then all others how sensors are. Requires a valid model.
+// Milliseconds for a sound model, up to a few seconds otherwise.
 std::optional<Conventions> FindConventions(const Model& model,
                                            const Database* database = nullptr,
                                            const Context& context = {});

@@ -311,8 +311,9 @@ Model Removed(const Model& model, const ModelCheck& check,
     }
     if (is_any) moved.points3D[k].xyz = check.points[k];
   }
-  Model cured = RemoveImages(RemoveObservations(moved, is_removed, false).model,
-                             is_wrong_image);
+  Model cured = RemoveImages(
+      RemoveObservations(moved, is_removed, /*drops_short=*/false).model,
+      is_wrong_image);
   UpdatePointErrors(PixelErrors(cured, context.num_threads), &cured);
   return cured;
 }

@@ -106,7 +106,7 @@ double MedianError(const Sights& sights, const Matrix23& map) {
                      [&](const Sight& sight) { return ErrorOf(map, sight); });
 }
 
-// The rows and columns that fit in 6, without allocation.
+// Up to 6 x 6, without allocation.
 using SmallMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
@@ -185,7 +185,7 @@ Matrix23 FitMap(const Sights& sights) {
 
 // Whether the map explains the pixels better than a turn and a move of the
 // cameras, all alike in their own axes, by this factor.
-bool IsNoMove(const Matrix23& map, Sights sights, double factor) {
+bool BeatsAnyMove(const Matrix23& map, Sights sights, double factor) {
   const double mapped = MedianError(
       sights, [&](const Sight& sight) { return ErrorAt(map, sight).norm(); });
   for (int step = 0; step < 5; ++step) {
@@ -308,7 +308,7 @@ class PixelMapSearch {
   }
 
  private:
-  // The map of an image, and of all that it explains.
+  // The map of an image and of all others that it explains.
   PixelMap MapOf(int32_t image) {
     PixelMap map;
     map.images = {image};
@@ -341,7 +341,7 @@ class PixelMapSearch {
     const Sights sights = SightsOf(map);
     return (!is_few ||
             MedianError(sights, map.image_from_camera) <= 2 * sound_px_) &&
-           IsNoMove(map.image_from_camera, sights, is_few ? 2 : 1);
+           BeatsAnyMove(map.image_from_camera, sights, is_few ? 2 : 1);
   }
 
   void Take(PixelMap map) {

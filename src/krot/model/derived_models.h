@@ -61,11 +61,11 @@ struct RemovedObservations {
 };
 
 // A copy of `model` without the track elements that `is_removed` marks, and
-// without the points that keep fewer than two elements, unless these lose none
-// and `drops_short` is false. 2D points that no
-// longer belong to a track name no 3D point. All images and 2D points stay, in
-// the same order. Requires a valid model; throws std::invalid_argument unless
-// there is one mark per element.
+// without the points that keep fewer than two elements; if `drops_short` is
+// false, only those of them that lose one. 2D points that no longer belong to a
+// track name no 3D point. All images and 2D points stay, in the same order.
+// Requires a valid model; throws std::invalid_argument unless there is one mark
+// per element.
 RemovedObservations RemoveObservations(const Model& model,
                                        const std::vector<char>& is_removed,
                                        bool drops_short = true);

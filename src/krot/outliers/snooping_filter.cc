@@ -28,7 +28,7 @@ class SnoopingFilter : private Filtering {
                  const Context& context)
       : Filtering(model, options, context) {
     w_.assign(model.track_elements.size(), 0);
-    kept_ = RemoveObservations(model, is_removed_, false);
+    kept_ = RemoveObservations(model, is_removed_, /*drops_short=*/false);
   }
 
   OutlierFilterResult Run() {
@@ -126,7 +126,7 @@ class SnoopingFilter : private Filtering {
     summary_.snooping->kept_error_before = Summarize(before);
     summary_.snooping->is_solved = cost <= cost_before;
     if (cost <= cost_before) return;
-    kept_ = RemoveObservations(model_, is_removed_, false);
+    kept_ = RemoveObservations(model_, is_removed_, /*drops_short=*/false);
   }
 
   // Sets a bound for each observation, and looks for conflicts of the removed

@@ -310,7 +310,8 @@ Filtering::Filtering(const Model& model, const OutlierFilterOptions& options,
 }
 
 void Filtering::RemoveMore(const std::vector<char>& is_gone) {
-  RemovedObservations rest = RemoveObservations(kept_.model, is_gone, false);
+  RemovedObservations rest =
+      RemoveObservations(kept_.model, is_gone, /*drops_short=*/false);
   for (uint64_t& e : rest.element_of) e = kept_.element_of[e];
   rest.num_left_alone += kept_.num_left_alone;
   rest.num_points += kept_.num_points;
