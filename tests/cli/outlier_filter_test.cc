@@ -50,7 +50,7 @@ class OutlierFilterCommand : public ::testing::Test {
                     folder_ / "r.json", "--overwrite", "1"},
                    more);
   }
-  KrotResult WithoutABound(Words more) const {
+  KrotResult WithoutABound(Words more = {}) const {
     return Filter(std::move(more), "");
   }
   KrotResult Check(const std::string& file) const {
@@ -282,26 +282,15 @@ TEST_F(OutlierFilterCommand, RefusesABoundThatIsNoPositiveNumber) {
 }
 
 TEST_F(OutlierFilterCommand, WithoutABoundRemovesWhatNoiseDoesNotExplain) {
-  const Words arguments = {
-      "outlier_filter",   "--input_path",     folder_ / "input",
-      "--output_path",    folder_ / "output", "--report_path",
-      folder_ / "r.json", "--outliers_path",  folder_ / "o.csv",
-      "--html_path",      folder_ / "r.html", "--conflicts_path",
-      folder_ / "c.json"};
-  const KrotResult result = Succeeded(RunKrot(arguments));
+  const KrotResult result =
+      Succeeded(WithoutABound({"--outliers_path", folder_ / "o.csv",
+                               "--html_path", folder_ / "r.html"}));
   EXPECT_THAT(result.out, HasSubstr("is more than noise of "));
+  EXPECT_THAT(result.out, Not(HasSubstr("must go")));
   const Json report = ReadJson(folder_ / "r.json");
   EXPECT_EQ(report["method"], "snooping");
   EXPECT_TRUE(report["max_error"].is_null());
-  const int must_go = report["num_must_go"];
-  EXPECT_GT(must_go, 0);
-  EXPECT_LE(must_go, report["num_removed"]);
-  EXPECT_THAT(result.out, HasSubstr("That at least " + std::to_string(must_go) +
-                                    " observations must go is proved"));
-  const KrotResult check = Succeeded(Check("c.json"));
-  EXPECT_THAT(check.out, HasSubstr("at least " + std::to_string(must_go) +
-                                   " observations must go"));
-  EXPECT_THAT(check.out, HasSubstr("their own bounds in the file"));
+  EXPECT_TRUE(report["num_must_go"].is_null());
   for (const Json& removed : report["removed"]) {
     EXPECT_TRUE(removed["w"].is_number() || removed["w"].is_null());
   }
@@ -314,6 +303,26 @@ TEST_F(OutlierFilterCommand, WithoutABoundRemovesWhatNoiseDoesNotExplain) {
                 .exit_code,
             1);
   EXPECT_EQ(Filter({"--OutlierFilter.method", "snooping"}).exit_code, 1);
+}
+
+TEST_F(OutlierFilterCommand, WithoutABoundProvesHowManyMustGoIfAskedTo) {
+  Succeeded(WithoutABound());
+  const Json unproved = ReadJson(folder_ / "r.json");
+  const KrotResult result =
+      Succeeded(WithoutABound({"--conflicts_path", folder_ / "c.json"}));
+  const Json report = ReadJson(folder_ / "r.json");
+  EXPECT_EQ(report["num_removed"], unproved["num_removed"]);
+  EXPECT_EQ(report["pixel_error"], unproved["pixel_error"]);
+  EXPECT_EQ(report["snooping"], unproved["snooping"]);
+  const int must_go = report["num_must_go"];
+  EXPECT_GT(must_go, 0);
+  EXPECT_LE(must_go, report["num_removed"]);
+  EXPECT_THAT(result.out, HasSubstr("That at least " + std::to_string(must_go) +
+                                    " observations must go is proved"));
+  const KrotResult check = Succeeded(Check("c.json"));
+  EXPECT_THAT(check.out, HasSubstr("at least " + std::to_string(must_go) +
+                                   " observations must go"));
+  EXPECT_THAT(check.out, HasSubstr("their own bounds in the file"));
 }
 
 TEST_F(OutlierFilterCommand, FiltersPanoramasAsTheCheckerSuggests) {

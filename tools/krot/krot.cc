@@ -44,7 +44,7 @@ constexpr Command kCommands[] = {
      &RunBundleAdjuster},
     {"model_checker", "say what is wrong with a model, and cure it",
      &RunModelChecker},
-    {"outlier_filter", "remove few observations, and prove how many must go",
+    {"outlier_filter", "remove the observations that do not fit",
      &RunOutlierFilter},
     {"tolerance_analyzer", "show everywhere that cameras and points may be",
      &RunToleranceAnalyzer},

@@ -78,6 +78,7 @@ OutlierFilterResult Filter(const OutlierCommand& command, const Model& model) {
   const LogOptions& log = command.common.log;
   OutlierFilterOptions options = command.options;
   options.make_profile = !command.profile_path.empty();
+  if (!command.conflicts_path.empty()) options.find_conflicts = true;
   Context context = command.context;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
   progress.Follow(&options.solve, &context);
@@ -199,8 +200,8 @@ int RunOutlierFilter(const std::vector<std::string>& arguments) {
   OptionParser parser("outlier_filter",
                       "removes the observations of a COLMAP model that noise "
                       "does not explain, or few so that all others are within "
-                      "a bound, and proves how many must go; rotations, "
-                      "intrinsics and the coordinate frame stay");
+                      "a bound, and proves how many of those must go; "
+                      "rotations, intrinsics and the coordinate frame stay");
   AddOutlierOptions(&command, &parser);
   if (!ParseOrPrintHelp(arguments, command.common.log, &parser))
     return kExitDone;

@@ -243,6 +243,7 @@ void ResolveOutlierFilterOptions(const OptionTable& table, bool makes_profile,
     table.RefuseAll({"OutlierFilter.max_error", "Solver.relative_gap",
                      "Problem.same_image"},
                     "with --OutlierFilter.method snooping");
+    options->find_conflicts = false;
   }
   if (options->method == OutlierMethod::kThreshold && !options->max_error) {
     throw OptionError(

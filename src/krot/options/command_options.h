@@ -58,8 +58,8 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
 
 // Must be called after the options are set. Chooses the method if none is
 // given: conflicts if there is a bound or a profile is asked for, otherwise
-// snooping. Throws OptionError for options that would have no effect, or need
-// another one.
+// snooping, without a proof of how many must go. Throws OptionError for options
+// that would have no effect, or need another one.
 void ResolveOutlierFilterOptions(const OptionTable& table, bool makes_profile,
                                  OutlierFilterOptions* options);
 

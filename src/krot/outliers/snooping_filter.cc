@@ -37,7 +37,11 @@ class SnoopingFilter : private Filtering {
       MoveToLeastSquares();
       if (context_.IsCancelled()) return {model_, std::move(summary_)};
     }
-    if (options_.find_conflicts && summary_.snooping->sigma_px) Prove();
+    if (const auto sigma_px = summary_.snooping->sigma_px) {
+      summary_.snooping->max_error_px =
+          summary_.snooping->critical_w * *sigma_px;
+      if (options_.find_conflicts) Prove();
+    }
     if (context_.IsCancelled()) return {model_, std::move(summary_)};
     StayIfBetter();
     summary_.is_within = true;
@@ -133,8 +137,6 @@ class SnoopingFilter : private Filtering {
   // ones.
   void Prove() {
     const Timer timer;
-    SnoopingSummary& summary = *summary_.snooping;
-    summary.max_error_px = summary.critical_w * *summary.sigma_px;
     BuildProblemOptions options;
     options.num_threads = context_.num_threads;
     BuiltProblem built = BuildProblem(model_, options);
@@ -148,7 +150,7 @@ class SnoopingFilter : private Filtering {
     removal.observations = IndicesWhere(SignedSize(elements), [&](int64_t i) {
       return is_removed_[elements[i]] != 0;
     });
-    const ErrorBound bound{Norm::L2(), summary.max_error_px};
+    const ErrorBound bound{Norm::L2(), summary_.snooping->max_error_px};
     ConflictPacking packing =
         PackAgainstRemoval(model_, built, bound, removal, {}, context_);
     summary_.is_search_complete = packing.is_complete;

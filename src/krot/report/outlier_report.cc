@@ -223,12 +223,16 @@ std::string ProfileTable(const ErrorProfileSummary& profile) {
 }
 
 std::string SuspectTable(const OutlierFilterSummary& summary) {
-  return TitledTable("Images with most of them",
-                     {"image", "observations", "removed", "conflicts"},
-                     summary.images, 5, [](const Suspect& image) -> Row {
-                       return {image.name, image.num_observations,
-                               image.num_removed, image.num_conflicts};
-                     });
+  const bool has_conflicts = summary.conflicts.has_value();
+  Row head = {"image", "observations", "removed"};
+  if (has_conflicts) head.emplace_back("conflicts");
+  return TitledTable(
+      "Images with most of them", std::move(head), summary.images, 5,
+      [&](const Suspect& image) {
+        Row row = {image.name, image.num_observations, image.num_removed};
+        if (has_conflicts) row.emplace_back(image.num_conflicts);
+        return row;
+      });
 }
 
 }  // namespace
@@ -287,9 +291,10 @@ std::string OutlierTable(const OutlierReport& report) {
              (summary.profile ? "made the profile in " +
                                     Seconds(summary.profile->seconds) + ", "
                               : "") +
-                 "chose " + Seconds(summary.seconds_removal) + ", proved " +
-                 Seconds(summary.seconds_conflicts) + ", solved " +
-                 Seconds(summary.seconds_solve));
+                 "chose " + Seconds(summary.seconds_removal) + ", " +
+                 TextIf(summary.conflicts.has_value(),
+                        "proved " + Seconds(summary.seconds_conflicts) + ", ") +
+                 "solved " + Seconds(summary.seconds_solve));
 }
 
 }  // namespace krot::internal
