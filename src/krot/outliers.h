@@ -17,8 +17,6 @@ namespace krot {
 
 enum class OutlierMethod {
   kConflicts,  // removes few, and proves how many must go at least
-  kThreshold,  // removes what is above the bound, solves, and repeats; for
-               // comparison
   kSnooping,   // without a bound: removes what noise does not explain
                // (krot/check.h)
 };
@@ -108,9 +106,9 @@ struct RotationSuspect {
 
 struct OutlierOptions {
   OutlierMethod method = OutlierMethod::kConflicts;
-  // The bound, true pixels; > 0. Required by kThreshold. None: the bound is
-  // what noise explains, and nothing is removed unless it is proved that noise
-  // does not explain all errors.
+  // The bound, true pixels; > 0. None: the bound is what noise explains, and
+  // nothing is removed unless it is proved that noise does not explain all
+  // errors.
   std::optional<double> max_error;
   bool find_conflicts = true;  // the proof, which takes most of the time
   bool make_profile = false;   // kConflicts: fill OutlierResult::profile

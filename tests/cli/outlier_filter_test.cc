@@ -100,17 +100,6 @@ TEST_F(OutlierFilterCommand, IsRefusedByTheCheckerOnceItsFileIsTamperedWith) {
   EXPECT_EQ(Check("less.json").exit_code, 2);
 }
 
-TEST_F(OutlierFilterCommand, ProvesNothingByTheThreshold) {
-  Succeeded(Filter({"--OutlierFilter.method", "threshold"}));
-  const Json report = ReadJson(folder_ / "r.json");
-  EXPECT_TRUE(report["num_must_go"].is_null());
-  EXPECT_TRUE(report["is_within"]);
-  EXPECT_EQ(Filter({"--OutlierFilter.method", "threshold", "--conflicts_path",
-                    folder_ / "c.json"})
-                .exit_code,
-            1);
-}
-
 TEST_F(OutlierFilterCommand, TakesItsBoundFromTheElbowOfTheProfile) {
   const std::string profile = folder_ / "profile.json";
   const KrotResult result =
@@ -204,11 +193,6 @@ TEST_F(OutlierFilterCommand, SaysThatThereIsNoElbowWhateverTheBound) {
   EXPECT_TRUE(ReadJson(folder_ / "profile.json")["elbow"].is_null());
 }
 
-TEST_F(OutlierFilterCommand, NeedsABoundForTheThreshold) {
-  EXPECT_THAT(WithoutABound({"--OutlierFilter.method", "threshold"}),
-              IsRefused(1, "krot outlier_filter", "is required"));
-}
-
 TEST_F(OutlierFilterCommand, SaysWhatItDoesInEveryPhase) {
   const KrotResult result = Succeeded(WithoutABound(
       {"--OutlierFilter.method", "conflicts", "--log_level", "2"}));
@@ -296,8 +280,6 @@ TEST_F(OutlierFilterCommand, WithoutABoundRemovesWhatNoiseDoesNotExplain) {
   }
   EXPECT_LE(report["pixel_error"]["after"]["rms"],
             report["snooping"]["kept_error_before"]["rms"]);
-  EXPECT_EQ(WithoutABound({"--OutlierFilter.method", "threshold"}).exit_code,
-            1);
   EXPECT_EQ(WithoutABound({"--OutlierFilter.method", "snooping",
                            "--OutlierFilter.profile_path", folder_ / "p.json"})
                 .exit_code,

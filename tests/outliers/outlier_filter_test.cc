@@ -96,18 +96,6 @@ TEST(FilterOutliers, ProvesMostOutliersThatCrowdAnImage) {
   EXPECT_GE(summary.num_proved, 0.75 * num_planted);
 }
 
-TEST(FilterOutliers, RemovesNoMoreThanTheThresholdDoes) {
-  for (const uint64_t seed : {4u, 5u, 6u}) {
-    const SyntheticScene scene = MakeOutlierScene(seed, 0.03, 100);
-    OutlierFilterOptions options = Within(2);
-    const OutlierFilterResult few = FilterOutliers(scene.model, options, {});
-    options.method = OutlierMethod::kThreshold;
-    const OutlierFilterResult plain = FilterOutliers(scene.model, options, {});
-    EXPECT_TRUE(plain.summary.is_within);
-    EXPECT_LE(few.summary.removed.size(), plain.summary.removed.size());
-  }
-}
-
 TEST(FilterOutliers, HasTheSameBitsAtOneAndTwoThreads) {
   const SyntheticScene scene = MakeOutlierScene(7, 0.05, 80);
   const OutlierFilterResult a = FilterOutliers(scene.model, Within(2), {1});

@@ -5,10 +5,9 @@
 
 For every model NAME of the folder DATA (all of them if none is named) and
 bounds of 0.9, 0.75 and 0.5 times its optimum, or that of so many pixels: what
-the conflicts' method removes, what it proves, their ratio, what the threshold's
-method removes, and the seconds of processor time of both. Every proof is judged by
-certificate_checker. What takes more than twenty such minutes, ten on two cores,
-is given up, and said so.
+is removed, what is proved, their ratio, and the seconds of processor time.
+Every proof is judged by certificate_checker. What takes more than twenty such
+minutes, ten on two cores, is given up, and said so.
 """
 
 import json
@@ -43,16 +42,14 @@ def run(krot, *arguments):
     return code, words, processor_seconds() - before
 
 
-def filter_model(krot, model, folder, max_error, method):
-    report = folder / f"{method}.json"
-    arguments = ["outlier_filter", "--input_path", str(model),
-                 "--output_path", str(folder / method), "--overwrite", "1",
-                 "--OutlierFilter.max_error", repr(max_error),
-                 "--OutlierFilter.method", method,
-                 "--report_path", str(report)]
-    if method == "conflicts":
-        arguments += ["--conflicts_path", str(folder / "proof.json")]
-    code, words, seconds = run(krot, *arguments)
+def filter_model(krot, model, folder, max_error):
+    report = folder / "report.json"
+    code, words, seconds = run(
+        krot, "outlier_filter", "--input_path", str(model),
+        "--output_path", str(folder / "filtered"), "--overwrite", "1",
+        "--OutlierFilter.max_error", repr(max_error),
+        "--conflicts_path", str(folder / "proof.json"),
+        "--report_path", str(report))
     if code != 0:
         return None, seconds, words
     return json.loads(report.read_text()), seconds, ""
@@ -80,22 +77,17 @@ def bounds_of(krot, model, pixels, folder):
 def measure(krot, model, pixels, folder):
     """Yields a row per bound."""
     for bound in bounds_of(krot, model, pixels, folder):
-        few, seconds, error = filter_model(krot, model, folder, bound,
-                                           "conflicts")
+        few, seconds, error = filter_model(krot, model, folder, bound)
         if few is None:
             print(f"{model.name:20} {bound:8.4f} {error}", flush=True)
             continue
-        plain, plain_seconds, _ = filter_model(krot, model, folder, bound,
-                                               "threshold")
         code, _, _ = run(krot, "certificate_checker", "--input_path",
                          str(model), "--certificate_path",
                          str(folder / "proof.json"))
         yield {"model": model.name, "bound": bound,
                "observations": few["num_observations"],
                "removed": few["num_removed"], "must": few["num_must_go"],
-               "threshold": plain["num_removed"] if plain else None,
-               "seconds": seconds, "threshold_seconds": plain_seconds,
-               "within": few["is_within"],
+               "seconds": seconds, "within": few["is_within"],
                "checked": code == 0}
 
 
@@ -107,7 +99,7 @@ def main():
                                    if p.is_dir())
     ratios = []
     print(f"{'model':20} {'bound':>8} {'of':>8} {'removed':>8} {'must':>6} "
-          f"{'ratio':>6} {'threshold':>9} {'s':>7} {'thr. s':>7}  proof")
+          f"{'ratio':>6} {'s':>7}  proof")
     for name in names:
         name, _, pixels = name.partition("=")
         with tempfile.TemporaryDirectory() as folder:
@@ -118,14 +110,9 @@ def main():
                 state = "holds" if row["checked"] else "REFUSED"
                 if not row["within"]:
                     state += ", NOT WITHIN"
-                if (row["threshold"] is not None
-                        and row["removed"] > row["threshold"]):
-                    state += ", MORE THAN THE THRESHOLD"
                 print(f"{row['model']:20} {row['bound']:8.4f} "
                       f"{row['observations']:8} {row['removed']:8} "
-                      f"{row['must']:6} {ratio:6.2f} "
-                      f"{row['threshold'] if row['threshold'] is not None else '-':>9} "
-                      f"{row['seconds']:7.2f} {row['threshold_seconds']:7.2f}"
+                      f"{row['must']:6} {ratio:6.2f} {row['seconds']:7.2f}"
                       f"  {state}", flush=True)
     if ratios:
         print(f"median ratio {statistics.median(ratios):.2f}")

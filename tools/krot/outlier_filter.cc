@@ -61,13 +61,9 @@ void CheckPairs(const OptionParser& parser, OutlierCommand* resolved) {
   ResolveOutlierFilterOptions(parser, !resolved->profile_path.empty(),
                               &resolved->options);
   const OutlierCommand& command = *resolved;
-  const std::string with_method = "with --OutlierFilter.method " +
-                                  OutlierMethodName(command.options.method);
   if (command.options.method != OutlierMethod::kConflicts) {
-    parser.Refuse("OutlierFilter.profile_path", with_method);
-  }
-  if (command.options.method == OutlierMethod::kThreshold) {
-    parser.Refuse("conflicts_path", with_method + ", which proves nothing");
+    parser.Refuse("OutlierFilter.profile_path",
+                  "with --OutlierFilter.method snooping");
   }
   if (command.paths.html_path.empty()) {
     parser.Refuse("image_path", "without --html_path");

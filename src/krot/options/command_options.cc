@@ -218,10 +218,8 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
   table->AddNamed<OutlierMethod>(
       "OutlierFilter.method", &options->method,
       {{"conflicts", OutlierMethod::kConflicts},
-       {"threshold", OutlierMethod::kThreshold},
        {"snooping", OutlierMethod::kSnooping}},
-      "conflicts: remove few for the bound; threshold: remove what is above "
-      "it, solve, and repeat, for comparison; snooping, the default without "
+      "conflicts: remove few for the bound; snooping, the default without "
       "max_error and profile_path: remove what noise does not explain");
   AddFinishLoss(&options->solve, table);
   table->AddReal("Solver.relative_gap", &options->solve.joint.relative_gap,
@@ -244,11 +242,6 @@ void ResolveOutlierFilterOptions(const OptionTable& table, bool makes_profile,
                      "Problem.same_image"},
                     "with --OutlierFilter.method snooping");
     options->find_conflicts = false;
-  }
-  if (options->method == OutlierMethod::kThreshold && !options->max_error) {
-    throw OptionError(
-        "--OutlierFilter.max_error is required with --OutlierFilter.method "
-        "threshold");
   }
   CheckFinishLoss(options->solve, table);
 }

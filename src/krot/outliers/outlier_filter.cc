@@ -39,11 +39,7 @@ class OutlierFilter : private Filtering {
         bound_{options.solve.norm, options.max_error.value_or(0)} {}
 
   OutlierFilterResult Run() {
-    if (options_.method == OutlierMethod::kConflicts) {
-      FilterByConflicts();
-    } else {
-      FilterByThreshold();
-    }
+    FilterByConflicts();
     summary_.max_error = bound_.max_error;
     if (context_.IsCancelled()) return {model_, std::move(summary_)};
     if (is_given_back_) {
@@ -140,17 +136,6 @@ class OutlierFilter : private Filtering {
   // find a two-hundredth fewer, and do not hold parts' scales.
   bool IsEnough() const {
     return summary_.init == SolveInit::kFeasible && !options_.find_conflicts;
-  }
-
-  void FilterByThreshold() {
-    for (size_t e = 0; e < errors_before_.size(); ++e) {
-      is_removed_[e] = !IsWithin(errors_before_[e]);
-    }
-    Model moved = model_;
-    do {
-      Solve(moved);
-    } while (!context_.IsCancelled() && summary_.num_solves < 50 &&
-             RemoveAbove());
   }
 
   // Chooses what to remove. Conflicts that this finds on the way go to `found`.
@@ -379,9 +364,6 @@ OutlierFilterResult FilterOutliers(const Model& model,
                 "solve.problem.positions", "some", "none");
   CheckArgument(!options.solve.problem.fixed.Any(), "solve.problem.fixed",
                 "something", "empty: everything moves");
-  CheckArgument(
-      options.max_error || options.method != OutlierMethod::kThreshold,
-      "max_error", "none", "given with this method");
   OutlierFilterResult result =
       InLocalFrame(LocalFrame(model), model, [&](const Model& local) {
         if (options.method == OutlierMethod::kSnooping) {

@@ -102,11 +102,11 @@ std::optional<RotationSuspect> FindRotationSuspect(
 
 struct OutlierFilterOptions {
   OutlierMethod method = OutlierMethod::kConflicts;
-  // The bound, true pixels; > 0. Required by kThreshold. If it is missing, it
-  // is what noise explains (FindNoiseLimit), provided that it is proved that no
-  // estimate brings all errors below that; otherwise nothing is removed, and
-  // the model stays as it is. From nothing, without a profile, it is what noise
-  // explains at the start (FindRemovalStart).
+  // The bound, true pixels; > 0. If it is missing, it is what noise explains
+  // (FindNoiseLimit), provided that it is proved that no estimate brings all
+  // errors below that; otherwise nothing is removed, and the model stays as it
+  // is. From nothing, without a profile, it is what noise explains at the start
+  // (FindRemovalStart).
   std::optional<double> max_error;
   // Whether the model's own positions were made from rotations and tracks
   // alone: then weakly tied parts are looked for, too.

@@ -239,10 +239,8 @@ std::string SuspectTable(const OutlierFilterSummary& summary) {
 
 std::string OutlierMethodName(OutlierMethod method) {
   using Enum = OutlierMethod;
-  return NameIn<Enum>({{Enum::kSnooping, "snooping"},
-                       {Enum::kConflicts, "conflicts"},
-                       {Enum::kThreshold, "threshold"}},
-                      method);
+  return NameIn<Enum>(
+      {{Enum::kSnooping, "snooping"}, {Enum::kConflicts, "conflicts"}}, method);
 }
 
 std::string BracketSentence(const OutlierFilterSummary& summary) {
