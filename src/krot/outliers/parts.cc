@@ -250,17 +250,15 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
   return part_of;
 }
 
-namespace {
-
-// The noise per axis, pixels, from the median error.
-double NoiseOfAll(const KnownRotationProblem& problem,
-                  const Estimate& estimate) {
+double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
+               const std::function<bool(int64_t i)>& counts) {
   std::vector<double> errors;
-  for (const Observation& o : problem.observations) {
+  for (size_t n = 0; n < problem.observations.size(); ++n) {
+    const Observation& o = problem.observations[n];
     const auto rows =
         2.0 * static_cast<double>(problem.point_begin[o.point + 1] -
                                   problem.point_begin[o.point]);
-    if (rows <= 3) continue;
+    if (rows <= 3 || !counts(static_cast<int64_t>(n))) continue;
     errors.push_back(ResidualOf(ViewPoint(problem, o, estimate), Norm::L2()) *
                      std::sqrt(rows / (rows - 3)));
   }
@@ -268,8 +266,6 @@ double NoiseOfAll(const KnownRotationProblem& problem,
   return std::max(kLeastNoisePx,
                   Median(std::move(errors)) / std::sqrt(2 * std::log(2.0)));
 }
-
-}  // namespace
 
 std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
                                      const Estimate& estimate,
@@ -282,8 +278,8 @@ std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
   if (own.observations.empty()) return std::nullopt;
   Estimate placed = subset.Restrict(estimate);
   PlacePointsRobustly(own, AllPoints(own), Norm::L2(), cap, context, &placed);
-  const auto [changes, deviation] =
-      FindSoftestMotion(own, placed, NoiseOfAll(own, placed), context);
+  const auto [changes, deviation] = FindSoftestMotion(
+      own, placed, NoiseOf(own, placed, [](int64_t) { return true; }), context);
   double least = kInfinity, most = -kInfinity;
   for (const std::optional<double>& change : changes) {
     least = std::min(least, change.value_or(least));

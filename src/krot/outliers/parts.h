@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -298,5 +299,10 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
                                     const Estimate& estimate,
                                     const std::vector<char>& kept, double cap,
                                     const Context& context);
+
+// The noise per axis, pixels, from the median error of the observations that
+// count.
+double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
+               const std::function<bool(int64_t i)>& counts);
 
 }  // namespace krot::internal

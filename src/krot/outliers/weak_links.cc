@@ -7,7 +7,6 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/cost.h"
@@ -32,29 +31,6 @@ std::vector<double> ScalesAround(double scale, double step, int num_steps) {
   return scales;
 }
 
-// The noise per axis, pixels, from the median error of the observations whose
-// points belong to the same group as their frames.
-double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
-               const std::vector<int32_t>& group_of,
-               const std::vector<int32_t>& point_group) {
-  std::vector<double> errors;
-  for (int64_t i = 0; i < static_cast<int64_t>(problem.observations.size());
-       ++i) {
-    const Observation& o = problem.observations[i];
-    const auto rows =
-        2.0 * static_cast<double>(problem.point_begin[o.point + 1] -
-                                  problem.point_begin[o.point]);
-    if (rows <= 4 || point_group[o.point] != group_of[problem.FrameOf(i)]) {
-      continue;
-    }
-    errors.push_back(ResidualOf(ViewPoint(problem, o, estimate), Norm::L2()) *
-                     std::sqrt(rows / (rows - 3)));
-  }
-  if (errors.empty()) return kLeastNoisePx;
-  return std::max(kLeastNoisePx,
-                  Median(std::move(errors)) / std::sqrt(2 * std::log(2.0)));
-}
-
 // Joins groups of frames until none share tracks.
 class Joiner {
  public:
@@ -70,7 +46,8 @@ class Joiner {
         estimate_(*estimate) {}
 
   std::vector<WeakLink> Run() {
-    sigma_ = std::max(NoiseOf(problem_, estimate_, group_of_, point_group_),
+    sigma_ = std::max(NoiseOf(problem_, estimate_,
+                              [this](int64_t i) { return TellsNoise(i); }),
                       cap_ / kAgreeing);
     if (!may_move_) usual_share_ = UsualShare();
     std::vector<WeakLink> links;
@@ -130,6 +107,14 @@ class Joiner {
       side.H = NormalOf(problem_, cameras, side, side.x).H;
     }
     return sides;
+  }
+
+  // Whether an observation belongs to the group of its point, which more than
+  // two see.
+  bool TellsNoise(int64_t i) const {
+    const int32_t k = problem_.observations[i].point;
+    return problem_.point_begin[k + 1] - problem_.point_begin[k] > 2 &&
+           point_group_[k] == group_of_[problem_.FrameOf(i)];
   }
 
   std::vector<char> FramesOf(int32_t group) const {
