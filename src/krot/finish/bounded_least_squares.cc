@@ -49,10 +49,7 @@ class BoundedPath {
       return summary_;
     }
     summary_.cost_initial = now_.cost;
-    // The first mu is large, as the start is near the boundary and has to leave
-    // it first. With multipliers of slacks below a hundredth of the cap's, the
-    // slack could only double in a step.
-    CentreMultipliers(MuOf(/*relative_gap=*/10), /*least_slack=*/0.01);
+    StartMultipliers();
     summary_.termination = FollowPath(context_, options_.max_iterations, this,
                                       &summary_.iterations);
     summary_.cost_final = now_.cost;
@@ -110,16 +107,11 @@ class BoundedPath {
     return step;
   }
 
-  bool Recover() {
-    if (std::exchange(is_centred_, true)) return false;
-    CentreMultipliers(target_mu_, 0);
-    return true;
-  }
+  bool Recover() { return false; }
 
   // It ends after three short steps in a row that gain next to nothing, near
   // the gap asked for: lenses near their fold follow no linear row far.
   std::optional<InteriorPointTermination> Report(int iteration, double step) {
-    is_centred_ = false;
     if (options_.callback) {
       options_.callback({iteration, now_.cost, RelativeGap(), step});
     }
@@ -203,10 +195,12 @@ class BoundedPath {
     return now_.cost > 0 ? Count() * mu_ / now_.cost : 0;
   }
 
-  // mu / h, with slacks h of no less than this share of the cap's.
-  void CentreMultipliers(double mu, double least_slack) {
-    const Vector least =
-        least_slack * system_.cap().Slacks(Eigen::Vector2d::Zero());
+  // mu / h. The first mu is large, as the start is near the boundary and has to
+  // leave it first. With multipliers of slacks h below a hundredth of the
+  // cap's, the slack could only double in a step.
+  void StartMultipliers() {
+    const double mu = MuOf(/*relative_gap=*/10);
+    const Vector least = 0.01 * system_.cap().Slacks(Eigen::Vector2d::Zero());
     const double gap = system_.loop().Sum([&](int64_t i) {
       const Vector& h = now_.viewed[i].h;
       multipliers_[i] = mu * h.cwiseMax(least).cwiseInverse();
@@ -253,11 +247,10 @@ class BoundedPath {
   BoundedSystem<Cap> system_;
   State now_, trial_;
   std::vector<Vector> multipliers_;
-  double mu_ = 0;            // mean of the pairs at now_
-  double target_mu_ = 0;     // that the direction aims at
-  double gain_ = 0;          // what the last step took off the barrier cost
-  int num_idle_ = 0;         // steps in a row
-  bool is_centred_ = false;  // the multipliers, after a failed step
+  double mu_ = 0;         // mean of the pairs at now_
+  double target_mu_ = 0;  // that the direction aims at
+  double gain_ = 0;       // what the last step took off the barrier cost
+  int num_idle_ = 0;      // steps in a row
   BoundedSummary summary_;
 };
 
