@@ -121,8 +121,8 @@ struct Charged {
         built(BuildProblem(scene.model, {})),
         removal(
             FindRemoval(scene.model, built, {Norm::L2(), kTwoViewBound}, {})),
-        worth(built.pixels.size(), 1) {
-    for (const int64_t i : removal.observations) worth[i] = 0;
+        is_free(built.pixels.size(), 1) {
+    for (const int64_t i : removal.observations) is_free[i] = 0;
   }
 
   int32_t ViewOf(int64_t i) const { return built.problem.observations[i].view; }
@@ -130,7 +130,7 @@ struct Charged {
   const SyntheticScene scene;
   const BuiltProblem built;
   const Removal removal;
-  std::vector<float> worth;
+  std::vector<char> is_free;
 };
 
 TEST(TwoViewConflicts, CandidatesDoNotGoTogetherByTheSolver) {
@@ -140,7 +140,8 @@ TEST(TwoViewConflicts, CandidatesDoNotGoTogetherByTheSolver) {
     const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate,
                                      kTwoViewBound);
     for (const int64_t i : c.removal.observations) {
-      for (const std::vector<int64_t>& set : conflicts.Candidates(i, c.worth)) {
+      for (const std::vector<int64_t>& set :
+           conflicts.Candidates(i, c.is_free)) {
         ++num_candidates;
         Work work;
         EXPECT_TRUE(FindConflict(c.scene.model, c.built,
@@ -154,18 +155,18 @@ TEST(TwoViewConflicts, CandidatesDoNotGoTogetherByTheSolver) {
 
 TEST(TwoViewConflicts, CandidatesAreOfTwoViewsAndOfWhatMayBeUsed) {
   Charged c(4);
-  for (size_t i = 0; i < c.worth.size(); i += 3) c.worth[i] = 0;
+  for (size_t i = 0; i < c.is_free.size(); i += 3) c.is_free[i] = 0;
   const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate,
                                    kTwoViewBound);
   size_t num_candidates = 0;
   for (const int64_t i : c.removal.observations) {
-    for (const std::vector<int64_t>& set : conflicts.Candidates(i, c.worth)) {
+    for (const std::vector<int64_t>& set : conflicts.Candidates(i, c.is_free)) {
       ++num_candidates;
       EXPECT_TRUE(std::is_sorted(set.begin(), set.end()));
       std::set<int32_t> views;
       for (const int64_t j : set) {
         views.insert(c.ViewOf(j));
-        EXPECT_TRUE(j == i || c.worth[j] > 0);
+        EXPECT_TRUE(j == i || c.is_free[j]);
       }
       EXPECT_EQ(views.size(), 2u);
       EXPECT_TRUE(std::binary_search(set.begin(), set.end(), i));
@@ -178,9 +179,9 @@ TEST(TwoViewConflicts, HasNoCandidateForWhatIsWithinTheBound) {
   const Charged c(5);
   const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate,
                                    kTwoViewBound);
-  for (int64_t i = 0; i < static_cast<int64_t>(c.worth.size()); ++i) {
-    if (c.worth[i] == 0) continue;
-    EXPECT_TRUE(conflicts.Candidates(i, c.worth).empty());
+  for (int64_t i = 0; i < static_cast<int64_t>(c.is_free.size()); ++i) {
+    if (!c.is_free[i]) continue;
+    EXPECT_TRUE(conflicts.Candidates(i, c.is_free).empty());
   }
 }
 

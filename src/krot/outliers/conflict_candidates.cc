@@ -130,22 +130,6 @@ std::vector<std::vector<int32_t>> Neighbourhoods::FrameSets(
   return sets;
 }
 
-std::vector<float> Worths(const KnownRotationProblem& problem,
-                          const std::vector<char>& is_free,
-                          const std::vector<int64_t>& open) {
-  std::vector<float> worth(is_free.begin(), is_free.end());
-  for (const int64_t i : open) {
-    const int32_t k = problem.observations[i].point;
-    const int64_t begin = problem.point_begin[k];
-    const int64_t end = problem.point_begin[k + 1];
-    if (std::count(&is_free[0] + begin, &is_free[0] + end, 1) > 2) continue;
-    for (int64_t j = begin; j < end; ++j) {
-      if (is_free[j]) worth[j] = 0.3F;  // others of its track need it
-    }
-  }
-  return worth;
-}
-
 std::vector<int64_t> TakeCrowded(const KnownRotationProblem& problem,
                                  const std::vector<char>& is_free,
                                  std::vector<int64_t>* open) {
@@ -257,7 +241,6 @@ bool TwoViewConflicts::AppendBand(int64_t i, int64_t j, const Vector3d& e,
 // in conflict with o if (S_j + m A_j) + (S_k + m A_k) < 0.
 void TwoViewConflicts::AppendTriples(const HalfPlane& violated,
                                      const std::vector<HalfPlane>& planes,
-                                     float worth,
                                      std::vector<Candidate>* candidates) const {
   // Shares of the excess that companions may use up; below 1, as the chart is
   // only approximate.
@@ -279,7 +262,7 @@ void TwoViewConflicts::AppendTriples(const HalfPlane& violated,
       best[side] = &plane;
       if (!(least[0] + least[1] < 0)) continue;
       Candidate candidate;
-      candidate.ease = std::min<double>(plane.ease, worth);
+      candidate.ease = plane.ease;
       for (const HalfPlane* own : {&violated, best[0], best[1]}) {
         candidate.observations.insert(candidate.observations.end(),
                                       own->observations.begin(),
@@ -293,12 +276,12 @@ void TwoViewConflicts::AppendTriples(const HalfPlane& violated,
 }
 
 std::vector<std::vector<int64_t>> TwoViewConflicts::Candidates(
-    int64_t i, const std::vector<float>& worth) const {
+    int64_t i, const std::vector<char>& is_free) const {
   const Observation& own = problem_.observations[i];
   std::vector<Candidate> candidates;
   for (const int64_t j : problem_.OfPoint(own.point)) {
     const Observation& other = problem_.observations[j];
-    if (j == i || !(worth[j] > 0) || other.view == own.view) continue;
+    if (j == i || !is_free[j] || other.view == own.view) continue;
     const Vector3d baseline =
         CentreOf(problem_, estimate_, j) - CentreOf(problem_, estimate_, i);
     if (!(baseline.norm() > 0)) continue;
@@ -312,7 +295,7 @@ std::vector<std::vector<int64_t>> TwoViewConflicts::Candidates(
     size_t n = 0;
     for (const int64_t a : in_own) {
       const int32_t point = problem_.observations[a].point;
-      if (point == own.point || !(worth[a] > 0)) continue;
+      if (point == own.point || !is_free[a]) continue;
       while (n < in_other.size() &&
              problem_.observations[in_other[n]].point < point) {
         ++n;
@@ -321,17 +304,14 @@ std::vector<std::vector<int64_t>> TwoViewConflicts::Candidates(
                          problem_.observations[in_other[l]].point == point;
            ++l) {
         const int64_t b = in_other[l];
-        if (!(worth[b] > 0) || !AppendBand(a, b, e, &planes)) continue;
-        for (size_t edge = planes.size() - 2; edge < planes.size(); ++edge) {
-          planes[edge].ease *= std::min(worth[a], worth[b]);
-        }
+        if (is_free[b]) AppendBand(a, b, e, &planes);
       }
     }
     std::sort(
         planes.begin(), planes.end(),
         [](const HalfPlane& a, const HalfPlane& b) { return a.ease > b.ease; });
     for (const HalfPlane& edge : edges) {
-      if (edge.slack < 0) AppendTriples(edge, planes, worth[j], &candidates);
+      if (edge.slack < 0) AppendTriples(edge, planes, &candidates);
     }
   }
   SortLargestFirst(&candidates, &Candidate::ease);

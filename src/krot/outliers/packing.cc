@@ -106,17 +106,16 @@ class Packing {
   }
   bool IsTaken(int64_t i) const { return is_taken_[i] != 0; }
 
-  std::optional<Conflict> InTwoViews(int64_t i, const std::vector<float>& worth,
-                                     Work* work) const {
+  std::optional<Conflict> InTwoViews(int64_t i, Work* work) const {
     std::vector<std::vector<int64_t>> sets;
     const Observation& own = problem_.observations[i];
     for (const int64_t j : problem_.OfPoint(own.point)) {
       const bool is_twin = j != i && problem_.observations[j].view == own.view;
-      if (is_twin && worth[j] > 0) {
+      if (is_twin && is_free_[j]) {
         sets.push_back({std::min(i, j), std::max(i, j)});
       }
     }
-    for (std::vector<int64_t>& set : two_views_.Candidates(i, worth)) {
+    for (std::vector<int64_t>& set : two_views_.Candidates(i, is_free_)) {
       sets.push_back(std::move(set));
     }
     for (const std::vector<int64_t>& set : sets) {
@@ -150,13 +149,9 @@ class Packing {
         if (!IsTaken(queue.back())) batch.push_back(queue.back());
         queue.pop_back();
       }
-      std::vector<int64_t> all = queue;
-      all.insert(all.end(), batch.begin(), batch.end());
-      const std::vector<float> worth = Worths(problem_, is_free_, all);
-      std::vector<std::optional<Conflict>> found =
-          SearchAll(batch.size(), [&](int64_t n, Work* work) {
-            return InTwoViews(batch[n], worth, work);
-          });
+      std::vector<std::optional<Conflict>> found = SearchAll(
+          batch.size(),
+          [&](int64_t n, Work* work) { return InTwoViews(batch[n], work); });
       std::vector<int64_t> again;
       for (size_t n = 0; n < batch.size(); ++n) {
         if (!found[n]) {

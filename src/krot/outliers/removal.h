@@ -223,15 +223,6 @@ class Neighbourhoods {
   std::vector<std::vector<int32_t>> points_of_frame_;  // ascending
 };
 
-// No two conflicts may share an observation. So each should use observations
-// that others need least.
-
-// How dispensable each observation is, in [0, 1]: 0 if it is not free, less
-// than 1 if the track of an open observation has little else, otherwise 1.
-std::vector<float> Worths(const KnownRotationProblem& problem,
-                          const std::vector<char>& is_free,
-                          const std::vector<int64_t>& open);
-
 // Takes out of `open` the observations in crowded views, and returns them:
 // views that have fewer than two free observations for each open one, as a
 // conflict in two views needs. Both keep their order.
@@ -258,14 +249,13 @@ class TwoViewConflicts {
   TwoViewConflicts(const KnownRotationProblem& problem,
                    const Estimate& estimate, double max_error);
 
-  // Sets of observations, ascending, each with i, that conflict as far as this
-  // test tells; the most dispensable first. Observation i must be above the
-  // bound at the estimate. worth[j] in [0, 1] says how dispensable observation
-  // j is, 0: not to be used. Points in the middle of their bands count as more
-  // dispensable, so that those near an edge are left to observations that need
-  // them. O(observations of the views of i's track).
+  // Sets of observations, ascending, each of i and free ones, that conflict as
+  // far as this test tells. Observation i must be above the bound at the
+  // estimate. No two conflicts may share an observation: sets of points in the
+  // middle of their bands come first, so that those near an edge are left to
+  // observations that need them. O(observations of the views of i's track).
   std::vector<std::vector<int64_t>> Candidates(
-      int64_t i, const std::vector<float>& worth) const;
+      int64_t i, const std::vector<char>& is_free) const;
 
  private:
   struct HalfPlane;
@@ -273,7 +263,7 @@ class TwoViewConflicts {
   bool AppendBand(int64_t i, int64_t j, const Eigen::Vector3d& e,
                   std::vector<HalfPlane>* planes) const;
   void AppendTriples(const HalfPlane& violated,
-                     const std::vector<HalfPlane>& planes, float worth,
+                     const std::vector<HalfPlane>& planes,
                      std::vector<Candidate>* candidates) const;
 
   const KnownRotationProblem& problem_;
