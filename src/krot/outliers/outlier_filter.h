@@ -174,7 +174,7 @@ struct OutlierFilterSummary : OutlierFindings {
   int64_t num_observations = 0;  // of the input
   int64_t num_points = 0;
   int64_t num_irreducible = 0;            // of the conflicts
-  std::optional<ConflictFile> conflicts;  // kConflicts, kSnooping
+  std::optional<ConflictFile> conflicts;  // if they were looked for
 
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;

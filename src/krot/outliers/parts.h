@@ -301,7 +301,8 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
                                     const Context& context);
 
 // The noise per axis, pixels, from the median error of the observations that
-// count.
+// count, each freed of what its own track's point has fitted of it. Tracks of
+// one are left out. O(observations).
 double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
                const std::function<bool(int64_t i)>& counts);
 
