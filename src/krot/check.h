@@ -123,7 +123,6 @@ struct PoseConventions {
 // model's points to where some images have them.
 struct PixelMap {
   std::vector<int32_t> images;  // in Model::images, ascending
-
   std::vector<std::string> image_names;
   // Their cameras with the intrinsics that their images ask for. Empty if other
   // images of these cameras fit, or no intrinsics explain the map: then the 2D
@@ -204,6 +203,7 @@ enum class ImageVerdict {
   kWeaklyHeld,  // its sound observations hold it ten times as weakly as the
                 // median image is held
   kWrong,
+  kNotJudged,  // it has a pose, but no 2D points that could check it
 };
 
 // Why an image is wrong. Noise up to three times the model's is no fault,

@@ -557,6 +557,76 @@ TEST(CheckModel, NeedsLessEvidenceWhereTracksKeepLittleOfAnImage) {
               ElementsAre(model.images[7].id));
 }
 
+// Adds views registered by hand: poses of the user's own, and nothing else.
+Model WithNovelViews(Model model, int num) {
+  const std::vector<ImageGeometry> images = ImageGeometries(model);
+  for (size_t n = 0; n < images.size(); ++n) {
+    model.images[n].cam_from_world = ToPose(images[n].cam_from_world);
+  }
+  for (int n = 0; n < num; ++n) {
+    Image view = model.images[n];
+    view.id = 1000 + static_cast<ImageId>(n);
+    view.name = "novel" + std::to_string(n) + ".jpg";
+    view.points2D.clear();
+    view.cam_from_world.translation.x() += 5 + n;
+    model.images.push_back(view);
+  }
+  UseTrivialRigs(&model);
+  ValidateModel(model);
+  return model;
+}
+
+// However many there are beside those that can be judged.
+TEST(CheckModel, DoesNotJudgeImagesWithoutAny2DPointAndTheCureKeepsThem) {
+  const Model sound = WithNovelViews(Scene(4, 10, 5), 10);
+  const ModelCheck fine = CheckModel(sound);
+  EXPECT_FALSE(fine.IsAnythingWrong());
+  EXPECT_EQ(fine.NumImages(ImageVerdict::kFine), 10);
+  EXPECT_EQ(fine.NumImages(ImageVerdict::kNotJudged), 10);
+  EXPECT_EQ(fine.NumImages(ImageVerdict::kWeaklyHeld), 0);
+  EXPECT_THAT(fine.parts, IsEmpty());
+
+  Model model = sound;
+  Turn(&model, 7, 3, {1, 2, 0});
+  const ModelCheck check = CheckModel(model);
+  EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+              ElementsAre(model.images[7].id));
+  EXPECT_EQ(check.NumImages(ImageVerdict::kNotJudged), 10);
+  const Model cured = CureModel(model, check).model;
+  ASSERT_EQ(cured.images.size(), model.images.size() - 1);
+  for (size_t n = 10; n < model.images.size(); ++n) {
+    EXPECT_EQ(cured.images[n - 1].name, model.images[n].name);
+    EXPECT_EQ(ImageGeometries(cured)[n - 1].cam_from_world.translation,
+              ImageGeometries(model)[n].cam_from_world.translation);
+  }
+}
+
+TEST(CheckModel, JudgesAnImageWithout2DPointsByItsMatches) {
+  Model model = WithFewObservationsOf(5, 0, Scene(7));
+  model.images[5].points2D.clear();
+  EXPECT_EQ(CheckModel(model).images[5].verdict, ImageVerdict::kNotJudged);
+  const Database database = DatabaseOf(Scene(7));
+  ModelCheckOptions options;
+  options.database = &database;
+  EXPECT_EQ(CheckModel(model, options).images[5].verdict, ImageVerdict::kFine);
+  Turn(&model, 5, 3, {1, 2, 0});
+  const ModelCheck check = CheckModel(model, options);
+  EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+              ElementsAre(model.images[5].id));
+}
+
+// Its frame stands where the other camera's observations hold it.
+TEST(CheckModel, TakesAnImageWithout2DPointsToBeHeldByItsFrame) {
+  SceneOptions options = SceneOf(8, 400, 6, 0.5, 3);
+  options.sensors_per_rig = 2;
+  options.has_rigs = true;
+  Model model =
+      WithFewObservationsOf(5, 0, SynthesizeScene(options).ground_truth);
+  model.images[5].points2D.clear();
+  const ModelCheck check = CheckModel(model);
+  EXPECT_EQ(check.NumImages(ImageVerdict::kFine), 16);
+}
+
 TEST(CheckModel, HasNoVerdictWithoutPositions) {
   Model model = Scene(1);
   for (Frame& frame : model.frames) {

@@ -173,6 +173,32 @@ TEST_F(ModelCheckerCommand, JudgesNoImageWithoutAPose) {
   EXPECT_EQ(checked["center_sigma"], nullptr);
 }
 
+TEST_F(ModelCheckerCommand, SaysThatAnImageWithout2DPointsIsNotJudged) {
+  Model model = Load(folder_ / "sound");
+  Image view = model.images[0];
+  view.id = 99;
+  view.name = "novel.jpg";
+  view.points2D.clear();
+  view.cam_from_world.translation.x() += 3;
+  model.images.push_back(view);
+  UseTrivialRigs(&model);
+  Save(model, folder_ / "novel");
+  const KrotResult result = Succeeded(
+      Check("novel", {"--fail_on", "wrong", "--report_path", folder_ / "r.json",
+                      "--output_path", folder_ / "cured"}));
+  EXPECT_THAT(result.out, StartsWith("Nothing is wrong: all "));
+  EXPECT_THAT(result.out, HasSubstr(" of 8 images agree within "));
+  EXPECT_THAT(result.out, HasSubstr("; 1 image is not judged.\n"));
+  EXPECT_THAT(result.out, HasSubstr("1 image has no 2D points: its pose cannot "
+                                    "be checked (novel.jpg).\n"));
+  const Json report = ReadJson(folder_ / "r.json");
+  EXPECT_EQ(report["num_images_not_judged"], 1);
+  EXPECT_EQ(report["images"][8]["verdict"], "not judged");
+  EXPECT_EQ(report["images"][8]["reason"],
+            "has no 2D points: its pose cannot be checked");
+  EXPECT_EQ(Load(folder_ / "cured").images.size(), 9u);
+}
+
 TEST_F(ModelCheckerCommand, RefusesAModelWhoseWriterHadNo2DPoints) {
   Model model = Load(folder_ / "sound");
   for (Image& image : model.images) {

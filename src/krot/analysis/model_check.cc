@@ -30,17 +30,18 @@ class Checker {
     noise_options_.false_alarm = options.false_alarm;
     noise_options_.is_left_out.assign(image_of_.size(), 0);
     const auto odd = FindOddFocalLengths(model);
+    const auto geometries = ImageGeometries(model);
+    const auto is_bare = HaveBarePoses(model, geometries);
     for (size_t n = 0; n < model.images.size(); ++n) {
       ImageCheck& image = check_.images.emplace_back();
       image.image_id = model.images[n].id;
       image.name = model.images[n].name;
+      if (is_bare[n]) image.verdict = ImageVerdict::kNotJudged;
+      is_judged_.push_back(geometries[n].has_pose && !is_bare[n]);
       image.focal_length_px = odd[n] ? odd[n]->own : 0;
       image.others_focal_length_px = odd[n] ? odd[n]->others : 0;
     }
     for (const int32_t n : image_of_) ++check_.images[n].num_observations;
-    for (const ImageGeometry& geometry : ImageGeometries(model)) {
-      has_pose_.push_back(geometry.has_pose);
-    }
   }
 
   ModelCheck Run() {
@@ -79,16 +80,18 @@ class Checker {
   void AskMatches() {
     check_.pairs = CheckPairs(model_, *options_.database, context_);
     for (size_t n = 0; n < check_.images.size(); ++n) {
-      if (!check_.pairs->images[n].is_wrong) continue;
+      const CheckedImage& matched = check_.pairs->images[n];
+      if (matched.num_kept + matched.num_contradictory > 0)
+        check_.images[n].verdict = ImageVerdict::kFine;
+      if (!matched.is_wrong) continue;
       check_.images[n].fault = ImageFault::kMatches;
       CallWrong(static_cast<int32_t>(n));
     }
     // Keypoints without a scale count as median ones.
     std::vector<double> known;
     for (const std::vector<float>& scales : options_.database->scales) {
-      for (const float scale : scales) {
+      for (const float scale : scales)
         if (scale > 0 && std::isfinite(scale)) known.push_back(scale);
-      }
     }
     if (known.empty()) return;
     check_.median_scale_px = LowerMedian(std::move(known));
@@ -205,7 +208,7 @@ class Checker {
     int32_t weakest = -1;
     for (int32_t n = 0; n < static_cast<int32_t>(sums_.size()); ++n) {
       const ImageCheck& image = check_.images[n];
-      if (IsWrong(n) || !has_pose_[n] ||
+      if (IsWrong(n) || !is_judged_[n] ||
           (check_.pairs && check_.pairs->images[n].kept_matches > 0) ||
           sums_[n].CenterSpread() <= kWeaklyHeld * spread) {
         continue;
@@ -358,7 +361,7 @@ class Checker {
       image.center_sigma = *check_.sigma_px * sums_[n].CenterSpread();
       image.turn_sigma_deg =
           kDegreesPerRadian * *check_.sigma_px * sums_[n].TurnSpread();
-      if (has_pose_[n]) sigmas.push_back(image.center_sigma);
+      if (is_judged_[n]) sigmas.push_back(image.center_sigma);
     }
     if (sigmas.size() <= 2) return;  // two images: their distance is the unit
     const double median = LowerMedian(std::move(sigmas));
@@ -368,7 +371,7 @@ class Checker {
       image.relative_center_sigma = std::isfinite(image.center_sigma)
                                         ? image.center_sigma / median
                                         : kInfinity;
-      if (has_pose_[n] && !(image.relative_center_sigma <= kWeaklyHeld)) {
+      if (is_judged_[n] && !(image.relative_center_sigma <= kWeaklyHeld)) {
         image.verdict = ImageVerdict::kWeaklyHeld;
       }
     }
@@ -377,10 +380,9 @@ class Checker {
   const Model& model_;
   const ModelCheckOptions& options_;
   const Context& context_;
-  const std::vector<int32_t> image_of_;  // by track element
-  std::vector<char> has_pose_;           // by image; others are not judged
-  // By image, in the model as it stands.
-  const std::vector<ErrorsInDisc> in_disc_;
+  const std::vector<int32_t> image_of_;      // by track element
+  std::vector<char> is_judged_;              // by image
+  const std::vector<ErrorsInDisc> in_disc_;  // by image, in `model_`
   NoiseOptions noise_options_;
   NoiseSnooping snooping_;
   std::vector<PoseSums> sums_;  // as Model::images, of their frames

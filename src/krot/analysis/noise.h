@@ -241,6 +241,11 @@ double SuccessExponent(int64_t num_successes, int64_t num_trials, double p);
 std::vector<PoseSums> AddUpImages(const Model& model, const ModelNoise& noise);
 std::vector<PoseSums> AddUpFrames(const Model& model, const ModelNoise& noise);
 
+// By image: whether it has a pose that nothing can check, as neither it has 2D
+// points nor others hold its frame.
+std::vector<char> HaveBarePoses(const Model& model,
+                                const std::vector<ImageGeometry>& geometries);
+
 // CheckModel of a model in COLMAP's conventions.
 ModelCheck CheckConverted(const Model& model, const ModelCheckOptions& options,
                           const Context& context);

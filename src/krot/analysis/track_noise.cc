@@ -309,6 +309,20 @@ std::vector<int32_t> PointsOfElements(const Model& model) {
   return point_of;
 }
 
+std::vector<char> HaveBarePoses(const Model& model,
+                                const std::vector<ImageGeometry>& geometries) {
+  std::vector<char> is_held(model.frames.size(), 0);
+  for (size_t n = 0; n < geometries.size(); ++n) {
+    if (geometries[n].has_pose && !model.images[n].points2D.empty())
+      is_held[geometries[n].frame] = 1;
+  }
+  std::vector<char> is_bare;
+  for (const ImageGeometry& geometry : geometries) {
+    is_bare.push_back(geometry.has_pose && is_held[geometry.frame] == 0);
+  }
+  return is_bare;
+}
+
 Vector3d TrackNoise::Point(int64_t k) const {
   const Vector4d& X = points_[k];
   const Vector3d xyz = X.head<3>() / X[3];

@@ -220,7 +220,9 @@ std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
     case ImageFault::kNone:
       break;
   }
-  return "";
+  return image.verdict == ImageVerdict::kNotJudged
+             ? "has no 2D points: its pose cannot be checked"
+             : "";
 }
 
 namespace {
@@ -271,6 +273,11 @@ std::string WhatContradicts(const CheckReport& report) {
   return "";
 }
 
+int64_t NumJudged(const ModelCheck& check) {
+  return static_cast<int64_t>(check.images.size()) -
+         check.NumImages(ImageVerdict::kNotJudged);
+}
+
 std::string NothingIsWrong(const CheckReport& report) {
   const ModelCheck& check = report.check;
   if (!check.sigma_px) {
@@ -281,7 +288,7 @@ std::string NothingIsWrong(const CheckReport& report) {
   }
   const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
   return "Nothing is wrong: all " + Thousands(report.num_observations) +
-         " observations of " + Counted(check.images.size(), "image") +
+         " observations of " + Counted(NumJudged(check), "image") +
          " agree within " + NoiseWords(check) +
          TextIf(num_weak > 0, "; " + Counted(num_weak, "image", "is", "are") +
                                   " weakly held");
@@ -314,6 +321,10 @@ std::string ForAdjusted(const CheckReport& report) {
     text += (check.IsAnythingWrong() ? "; and " : "; but ") +
             Counted(check.parts.size(), "part", "is", "are") + " loose";
   }
+  const int64_t num_bare = check.NumImages(ImageVerdict::kNotJudged);
+  if (num_bare > 0) {
+    text += "; " + Counted(num_bare, "image", "is", "are") + " not judged";
+  }
   return text + ".";
 }
 
@@ -341,16 +352,6 @@ std::string ConvertedSentence(const CheckReport& report) {
          " As it stands: " + ForAdjusted(report);
 }
 
-std::string SamePhotosSentence(const ModelCheck& check) {
-  if (check.same_photos.empty()) return "";
-  const auto [first, second] = check.same_photos.front();
-  const size_t num_more = check.same_photos.size() - 1;
-  return check.images[first].name + " and " + check.images[second].name +
-         " are the same photo" +
-         TextIf(num_more > 0, ", as are " + Counted(num_more, "other pair")) +
-         ": the observations count twice, so remove one of the two.\n";
-}
-
 }  // namespace
 
 std::string CheckSentence(const CheckReport& report) {
@@ -364,14 +365,16 @@ std::string CheckSentence(const CheckReport& report) {
 std::string CheckTable(const CheckReport& report, int max_rows) {
   const ModelCheck& check = report.check;
   const auto num_rows = static_cast<size_t>(max_rows);
+  const int64_t num_bare = check.NumImages(ImageVerdict::kNotJudged);
   std::string text = CheckSentence(report) + "\n";
-  text +=
-      "Images: " + Thousands(check.NumImages(ImageVerdict::kWrong)) +
-      " wrong, " + Thousands(check.NumImages(ImageVerdict::kWeaklyHeld)) +
-      " weakly held, " + Thousands(check.NumImages(ImageVerdict::kFine)) +
-      " fine. Observations that others check: " + Thousands(check.num_tested) +
-      ".\n";
-  text += SamePhotosSentence(check);
+  text += "Images: " + Thousands(check.NumImages(ImageVerdict::kWrong)) +
+          " wrong, " + Thousands(check.NumImages(ImageVerdict::kWeaklyHeld)) +
+          " weakly held, " + Thousands(check.NumImages(ImageVerdict::kFine)) +
+          " fine" +
+          TextIf(num_bare > 0, ", " + Thousands(num_bare) + " not judged") +
+          ". Observations that others check: " + Thousands(check.num_tested) +
+          ".\n";
+  text += NotJudgedSentence(check) + SamePhotosSentence(check);
   if (!check.parts.empty()) text += PartsSentence(check) + "\n";
   if (!check.is_adjusted && check.cameras.empty()) {
     text +=

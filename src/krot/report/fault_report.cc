@@ -110,6 +110,29 @@ std::string PartsSentence(const ModelCheck& check) {
          ".";
 }
 
+std::string NotJudgedSentence(const ModelCheck& check) {
+  std::vector<std::string> names;
+  for (const ImageCheck& image : check.images) {
+    if (image.verdict == ImageVerdict::kNotJudged) names.push_back(image.name);
+  }
+  const size_t count = names.size();
+  return TextIf(
+      count > 0,
+      Counted(count, "image", "has", "have") +
+          " no 2D points: " + (count == 1 ? "its pose" : "their poses") +
+          " cannot be checked (" + ListText(std::move(names), 5) + ").\n");
+}
+
+std::string SamePhotosSentence(const ModelCheck& check) {
+  if (check.same_photos.empty()) return "";
+  const auto [first, second] = check.same_photos.front();
+  const size_t num_more = check.same_photos.size() - 1;
+  return check.images[first].name + " and " + check.images[second].name +
+         " are the same photo" +
+         TextIf(num_more > 0, ", as are " + Counted(num_more, "other pair")) +
+         ": the observations count twice, so remove one of the two.\n";
+}
+
 std::string PartTable(const ModelCheck& check, size_t max_rows) {
   return TitledTable("Parts that tracks do not tie to the rest firmly: " +
                          Thousands(check.parts.size()),
@@ -233,7 +256,8 @@ std::string LastingFaultLines(const LastingFaults& faults) {
 namespace {
 
 const char* VerdictName(ImageVerdict verdict) {
-  constexpr const char* kNames[] = {"fine", "weakly held", "wrong"};
+  constexpr const char* kNames[] = {"fine", "weakly held", "wrong",
+                                    "not judged"};
   return kNames[static_cast<size_t>(verdict)];
 }
 
@@ -291,6 +315,7 @@ std::string CheckJson(const CheckReport& report) {
       {"num_images", check.images.size()},
       {"num_wrong_images", check.NumImages(ImageVerdict::kWrong)},
       {"num_weakly_held_images", check.NumImages(ImageVerdict::kWeaklyHeld)},
+      {"num_images_not_judged", check.NumImages(ImageVerdict::kNotJudged)},
       {"num_observations", report.num_observations},
       {"num_tested", check.num_tested},
       {"num_wrong_observations", check.observations.size()},

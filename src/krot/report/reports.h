@@ -141,6 +141,11 @@ std::string SigmaText(double sigma);
 
 // What too few tracks tie to the rest of a model; "" if all is tied.
 std::string PartsSentence(const ModelCheck& check);
+
+// Names the images that nothing can check, and pairs that are the same photo,
+// one line each; "" if there are none.
+std::string NotJudgedSentence(const ModelCheck& check);
+std::string SamePhotosSentence(const ModelCheck& check);
 std::string PartTable(const ModelCheck& check, size_t max_rows);
 // How the model's numbers are to be read.
 std::string ConventionsSentence(const Conventions& conventions);

@@ -45,7 +45,8 @@ export function verdictsNote({ images, observations }) {
     images.filter((image) => image.verdict === verdict).length;
   return `${counted(number('wrong'), 'image')} wrong (red in the 3D view), ${
     count(number('weakly held'))} weakly held (amber), ${
-    count(number('fine'))} fine; ${
+    count(number('fine'))} fine${
+    number('not judged') > 0 ? `, ${count(number('not judged'))} not judged` : ''}; ${
     counted(observations.length, 'wrong observation')} in images that are not ` +
     'wrong (their points are marked). Click a row to see it in the 3D view.';
 }
