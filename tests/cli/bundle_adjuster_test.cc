@@ -1,10 +1,13 @@
 #include <cmath>
 #include <fstream>
+#include <random>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
+#include "krot/camera/camera_model.h"
 #include "krot/geometry.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"
@@ -15,6 +18,8 @@
 
 namespace krot::internal {
 namespace {
+
+using ::testing::AllOf;
 
 class BundleAdjuster : public ::testing::Test {
  protected:
@@ -107,6 +112,86 @@ TEST_F(BundleAdjuster, TellsOfItsPrecision) {
   EXPECT_EQ(precision["images"].size(), report["num_images"]);
   EXPECT_TRUE(precision["images"][0]["covariance"][5][5].is_number());
   EXPECT_EQ(precision["cameras"][0]["params"][0], "f");
+}
+
+// Cameras side by side that look the same way: another focal length makes
+// another depth, and the errors stay. Small turns would tell, if there were no
+// noise.
+Model SideBySide(double turn_rad, double noise_px) {
+  Model model;
+  model.cameras.push_back({7, 0, 1000, 800, {900, 500, 400}});
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::normal_distribution<double> noise(0, noise_px);
+  for (int n = 0; n < 4; ++n) {
+    Image& image = model.images.emplace_back();
+    image.id = n + 1;
+    image.camera_id = 7;
+    image.name = std::to_string(n) + ".jpg";
+    const Eigen::Matrix3d turn =
+        Eigen::AngleAxisd(turn_rad * n, Eigen::Vector3d::UnitX()).matrix();
+    const Eigen::Vector3d center(0.3 * n, 0.1 * (n % 2), 0);
+    image.cam_from_world = ToPose({turn, -turn * center});
+  }
+  for (int k = 0; k < 60; ++k) {
+    Point3D& point = model.points3D.emplace_back();
+    point.id = k + 1;
+    point.xyz = {uniform(random), uniform(random), 5 + uniform(random)};
+    point.track_begin = model.track_elements.size();
+    for (Image& image : model.images) {
+      const auto pixel = ProjectPoint(
+          model.cameras[0], image.cam_from_world.Transform() * point.xyz);
+      model.track_elements.push_back(
+          {image.id, static_cast<uint32_t>(image.points2D.size())});
+      image.points2D.push_back(
+          {pixel->x() + noise(random), pixel->y() + noise(random), point.id});
+    }
+    point.track_end = model.track_elements.size();
+  }
+  UseTrivialRigs(&model);
+  model.stores_rigs = false;
+  return model;
+}
+
+TEST_F(BundleAdjuster, WarnsOfAFocalLengthThatIsNotDetermined) {
+  const Words as_it_is = {"--BundleAdjustment.max_num_iterations", "0"};
+  const auto warning = [&](const Model& model) {
+    Save(model, folder_ / "input");
+    const KrotResult result = Succeeded(Adjust(as_it_is));
+    EXPECT_EQ(Report()["warnings"].size(), 1u);
+    const std::string words = Report()["warnings"].at(0);
+    EXPECT_THAT(result.err, HasSubstr("warning: " + words + "\n"));
+    return words;
+  };
+  const std::string what = "camera 7: the observations do not determine ";
+  EXPECT_THAT(warning(SideBySide(3e-4, 0.5)),
+              AllOf(HasSubstr(what + "f, which is 900 +- "),
+                    HasSubstr("--BundleAdjustment.refine_focal_length 0")));
+  EXPECT_THAT(warning(SideBySide(0, 1e-3)), HasSubstr(what));
+  Succeeded(Adjust({"--BundleAdjustment.refine_focal_length", "0"}));
+  EXPECT_TRUE(Report()["warnings"].empty());
+  // Far larger turns determine it.
+  Save(SideBySide(0.1, 0.5), folder_ / "input");
+  Succeeded(Adjust({}));
+  EXPECT_TRUE(Report()["warnings"].empty());
+}
+
+TEST_F(BundleAdjuster, WarnsOfAnEndAtTheLimitFarFromAMinimum) {
+  Model model = Load(folder_ / "input");
+  for (Point3D& point : model.points3D) point.xyz.x() += 0.05;
+  Save(model, folder_ / "input");
+  const Words few = {"--BundleAdjustment.max_num_iterations", "1"};
+  const KrotResult result = Succeeded(Adjust(few));
+  EXPECT_THAT(result.err, HasSubstr("warning: the adjustment ended at the "
+                                    "limit of iterations, far from a minimum"));
+  EXPECT_THAT(result.err,
+              HasSubstr("allow more (--BundleAdjustmentCeres.max_num_"));
+  Succeeded(Adjust({}));
+  EXPECT_TRUE(Report()["warnings"].empty());
+  // Nothing is left to gain where it ended.
+  Save(Load(folder_ / "output"), folder_ / "input");
+  Succeeded(Adjust(few));
+  EXPECT_TRUE(Report()["warnings"].empty());
 }
 
 TEST_F(BundleAdjuster, WritesAProtocolWhereTheReportIsText) {

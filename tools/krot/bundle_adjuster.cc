@@ -151,6 +151,9 @@ int Run(const ModelPaths& paths, const std::string& check_points_path,
                AdjustmentJson(report, result.model), model, result.model,
                num_threads, common.log);
   PrintTable(common.log, AdjustmentTable(report));
+  for (const std::string& words : AdjustmentWarnings(report, result.model)) {
+    LogLine(common.log, 0, "warning: " + words);
+  }
   WarnOfDegeneration(model, result.model, common.log);
   if (context.IsCancelled()) ThrowInterrupted(paths);
   return kExitDone;

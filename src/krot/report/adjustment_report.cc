@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "krot/base/numbers.h"
+#include "krot/camera/camera_model.h"
 #include "krot/report/report_json.h"
 #include "krot/report/sentences.h"
 #include "krot/report/text_table.h"
@@ -133,7 +134,99 @@ std::string KnownPositionsSentence(const AdjustmentReport& report) {
          " standard deviations.";
 }
 
+// By how far the parameter's standard deviation moves a corner of the image,
+// relative to the corner's distance from the principal point: the most of all
+// corners.
+double CornerShift(const Camera& camera, int param, double sigma) {
+  const int num_focal = FindCameraModel(camera.model_id)->num_focal_lengths();
+  const Eigen::Vector2d center(camera.params[num_focal],
+                               camera.params[num_focal + 1]);
+  Camera moved = camera;
+  const double step = 1e-6 * std::max(1.0, std::abs(camera.params[param]));
+  moved.params[param] += step;
+  double most = 0;
+  for (const int corner : {0, 1, 2, 3}) {
+    const Eigen::Vector2d pixel(
+        static_cast<double>(corner % 2 == 0 ? 0 : camera.width),
+        static_cast<double>(corner / 2 == 0 ? 0 : camera.height));
+    const auto undistorted = UndistortPixel(camera, pixel);
+    // Beyond the fold of a lens, as without distortion.
+    const Eigen::Vector2d u =
+        undistorted ? undistorted->u
+                    : Eigen::Vector2d((pixel - center) / camera.params[0]);
+    const double shift_px =
+        sigma * (ProjectRay(moved, u) - ProjectRay(camera, u)).norm() / step;
+    if (std::isfinite(shift_px)) {
+      most = std::max(most, shift_px / (pixel - center).norm());
+    }
+  }
+  return most;
+}
+
+std::string HoldWords(const Camera& camera, int param) {
+  const int num_focal = FindCameraModel(camera.model_id)->num_focal_lengths();
+  const char* const group = param < num_focal       ? "focal_length"
+                            : param < num_focal + 2 ? "principal_point"
+                                                    : "extra_params";
+  return "hold it (--BundleAdjustment.refine_" + std::string(group) + " 0)";
+}
+
+// About a camera's refined parameter that the observations leave open the most;
+// empty if they determine all.
+std::string NotDeterminedSentence(const CameraPrecision& precision,
+                                  const Camera& camera) {
+  const std::string who = "camera " + std::to_string(camera.id) + ": ";
+  if (!precision.covariance) {
+    return who +
+           "the observations do not determine all intrinsics that may "
+           "move; hold some (--BundleAdjustment.refine_focal_length 0, "
+           "refine_extra_params 0)";
+  }
+  const Eigen::VectorXd sigmas = Deviations(*precision.covariance);
+  double most = 1;
+  std::string sentence;
+  for (size_t n = 0; n < precision.params.size(); ++n) {
+    const int param = precision.params[n];
+    const double sigma = sigmas[static_cast<Eigen::Index>(n)];
+    const double shift = CornerShift(camera, param, sigma);
+    if (!(shift > most)) continue;
+    most = shift;
+    sentence = who + "the observations do not determine " +
+               ParamNames(camera.model_id)[param] + ", which is " +
+               FormatLength(camera.params[param]) + " +- " +
+               FormatLength(sigma) + "; " + HoldWords(camera, param);
+  }
+  return sentence;
+}
+
 }  // namespace
+
+std::vector<std::string> AdjustmentWarnings(const AdjustmentReport& report,
+                                            const Model& model) {
+  const BundleAdjustmentSummary& summary = report.summary.adjustment;
+  std::vector<std::string> warnings;
+  // What is left to gain is more than noise explains. Who allows no iteration
+  // wants none.
+  const auto redundancy = static_cast<double>(2 * summary.num_observations -
+                                              summary.num_parameters);
+  if (summary.termination == BundleAdjustmentTermination::kMaxIterations &&
+      summary.num_iterations > 0 &&
+      summary.stationarity.value_or(0) * redundancy > 1) {
+    warnings.push_back(
+        "the adjustment ended at the limit of iterations, far from a minimum: "
+        "its stationarity is " +
+        Scientific(summary.stationarity) +
+        "; allow more (--BundleAdjustmentCeres.max_num_iterations)");
+  }
+  const auto& precision = report.summary.precision;
+  if (!precision || !precision->has_covariances) return warnings;
+  for (const CameraPrecision& one : precision->cameras) {
+    std::string sentence =
+        NotDeterminedSentence(one, model.cameras[one.camera]);
+    if (!sentence.empty()) warnings.push_back(std::move(sentence));
+  }
+  return warnings;
+}
 
 std::string AdjustmentTerminationName(BundleAdjustmentTermination termination) {
   using Enum = BundleAdjustmentTermination;
@@ -236,6 +329,7 @@ std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
                          {"start", ErrorJson(summary.pixel_error_start)},
                          {"after", ErrorJson(summary.pixel_error_after)}};
   json["precision"] = JsonIf(summary.precision, precision_of);
+  json["warnings"] = AdjustmentWarnings(report, model);
   json["check_points"] = SurveyJson(report.check_points, true);
   json["positions"] = KnownPositionsJson(report);
   json["distances"] = AdjustedDistancesJson(report.distances);

@@ -45,6 +45,12 @@ std::string AdjustedDistanceTable(const DistanceComparison& comparison);
 // For the terminal: errors before and after, what took part, why it ended.
 std::string AdjustmentTable(const AdjustmentReport& report);
 
+// What is not to be relied on, and what to do about it: intrinsics that are not
+// determined, where the precision is known, and an end far from a minimum.
+// `model` is the one that is written.
+std::vector<std::string> AdjustmentWarnings(const AdjustmentReport& report,
+                                            const Model& model);
+
 // report.json; docs/cli.md lists its keys. What is not known is null. `model`
 // is the one that is written.
 std::string AdjustmentJson(const AdjustmentReport& report, const Model& model);
