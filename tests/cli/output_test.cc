@@ -1,4 +1,7 @@
+#include <unistd.h>
+
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -35,6 +38,42 @@ class Output : public ::testing::Test {
 
   TempFolder folder_;
 };
+
+// What `head` does to a pipeline: the pipes that `redirections` join to stdout
+// have no reader. The code that the command ends with.
+int CodeWithoutReader(const Words& arguments, const std::string& redirections,
+                      const fs::path& folder) {
+  std::string command = "( sleep 0.2; '" KROT_EXECUTABLE "'";
+  for (const std::string& word : arguments) command += " '" + word + "'";
+  command +=
+      " " + redirections + "; echo $? >'" + folder.string() + "/code' ) | true";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+  while (!fs::exists(folder / "code") || ReadBytes(folder / "code").empty()) {
+    usleep(10000);
+  }
+  const int code = std::stoi(ReadBytes(folder / "code"));
+  fs::remove(folder / "code");
+  return code;
+}
+
+TEST_F(Output, IsWrittenThoughNobodyReadsWhatIsPrinted) {
+  const std::string output = folder_ / "output";
+  const Words arguments = {"solver",
+                           "--input_path",
+                           folder_ / "input",
+                           "--output_path",
+                           output,
+                           "--overwrite",
+                           "1"};
+  EXPECT_EQ(CodeWithoutReader(arguments, "2>&1", folder_.path()), 141);
+  EXPECT_EQ(FileNames(folder_.path()), (Words{"input", "output"}));
+  EXPECT_EQ(Load(output).images.size(), Load(folder_ / "input").images.size());
+  const std::string printed = "2>&1 >'" + (folder_ / "printed").string() + "'";
+  EXPECT_EQ(CodeWithoutReader(arguments, printed, folder_.path()), 0);
+  EXPECT_THAT(ReadBytes(folder_ / "printed"), HasSubstr("in all on"));
+  // The code says what matters more.
+  EXPECT_EQ(CodeWithoutReader({"solver"}, "2>&1", folder_.path()), 1);
+}
 
 TEST_F(Output, ReplacesNoDatabaseUnlessAsked) {
   const auto synthesize = [&](const Words& more) {

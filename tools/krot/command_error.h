@@ -21,6 +21,7 @@ enum ExitCode {
   kExitWrong = 9,
   kExitUnreliable = 10,
   kExitInterrupted = 130,
+  kExitClosedPipe = 141,
 };
 
 // Ends a command; what() is one sentence for the user.

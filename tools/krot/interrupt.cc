@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <thread>
 
@@ -15,6 +16,7 @@ namespace {
 
 CancelFlag interrupted{false};
 std::atomic<bool> is_ending{false};
+std::atomic<bool> has_met_closed_pipe{false};
 static_assert(CancelFlag::is_always_lock_free,
               "a signal handler may set lock-free atomics only");
 
@@ -42,6 +44,14 @@ void EndOnInterrupt(const std::string& who) {
 }
 
 void Interrupt() { interrupted.store(true); }
+
+void OutliveClosedPipes() {
+#ifdef SIGPIPE  // Windows has none
+  std::signal(SIGPIPE, [](int) { has_met_closed_pipe.store(true); });
+#endif
+}
+
+bool HasMetClosedPipe() { return has_met_closed_pipe.load(); }
 
 const CancelFlag& DeferInterrupts() {
   OnEndRequest(&SetInterrupted, /*once=*/true);

@@ -6,7 +6,7 @@
 
 namespace krot::internal {
 
-// What SIGINT and SIGTERM do to a command.
+// What SIGINT, SIGTERM and SIGPIPE do to a command.
 
 // From now on they end the process at once, with kExitInterrupted and a
 // sentence that begins with `who`. For as long as nothing has been written.
@@ -19,5 +19,13 @@ const CancelFlag& DeferInterrupts();
 
 // Sets that flag.
 void Interrupt();
+
+// From now on writing into a pipe that nobody reads any more fails, and does
+// not end the process (SIGPIPE): a model is written though its progress is not
+// read.
+void OutliveClosedPipes();
+
+// Whether that has happened.
+bool HasMetClosedPipe();
 
 }  // namespace krot::internal

@@ -82,7 +82,8 @@ constexpr char kExitCodes[] =
     "    9  something is wrong with the model, and --fail_on wrong asked\n"
     "   10  positions from nothing that are not to be relied on: the model is "
     "written\n"
-    "  130  interrupted by SIGINT or SIGTERM\n";
+    "  130  interrupted by SIGINT or SIGTERM\n"
+    "  141  done, but the reader of stdout left\n";
 
 const Command* FindCommand(const std::string& name) {
   const auto it = std::find_if(
@@ -176,6 +177,8 @@ int RunOrFail(const std::string& who,
   try {
     const int exit_code = RunCommand(arguments);
     if (!std::cout.flush()) {
+      if (HasMetClosedPipe())
+        return exit_code == kExitDone ? kExitClosedPipe : exit_code;
       return Fail(who, "stdout cannot be written", kExitNotWritten);
     }
     return exit_code;
@@ -236,6 +239,7 @@ int Main(const std::vector<std::string>& arguments) {
           ? "krot"
           : "krot " + arguments.front();
   EndOnInterrupt(who);
+  OutliveClosedPipes();
   out_of_memory = who + ": out of memory\n";
   std::set_new_handler(&OnMemoryEnd);
   std::set_terminate(&EndWithoutUnwinding);
