@@ -127,7 +127,6 @@ struct PixelMap {
   // Their cameras with the intrinsics that their images ask for. Empty if other
   // images of these cameras fit, or no intrinsics explain the map: then the 2D
   // points are those of other photos.
-
   std::vector<Camera> cameras;
   // The image's pixel of a camera's (x, y, 1).
   Eigen::Matrix<double, 2, 3> image_from_camera;
@@ -302,7 +301,8 @@ struct WrongCamera {
   int64_t num_images = 0;
   // Fall of all squared errors by those of its images, to first order; [0, 1].
   double gain = 0;
-  // The mean focal length, as it is and as the images ask for, pixels.
+  std::vector<double> focal_lengths_px;  // kFocalLength: as they are
+  // Their mean, as it is and as the images ask for, pixels.
   double focal_length_px = 0;
   double asked_focal_length_px = 0;
   // kPrincipalPoint: by how much it is off, pixels.

@@ -223,6 +223,8 @@ Outcome CheckModelCommand(const ModelPointer& model, const Progress&,
   });
   report.run = command.run;
   report.moved = std::move(cure.moved);
+  if (!report.check.conventions)
+    report.discarded = FindDiscardedCameras(*model);
   return OutcomeOf(std::move(cure.model), CheckJson(report));
 }
 

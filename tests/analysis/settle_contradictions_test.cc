@@ -1,6 +1,7 @@
 #include "krot/analysis/model_input.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -114,8 +115,27 @@ TEST(SettleContradictions, CountsElementsThatDoNotExistAsInfinitelyWrong) {
   }
   const Contradictions found = SettleContradictions("auto", &model);
   EXPECT_EQ(found.followed, "images");
-  EXPECT_EQ(found.of_tracks->median, std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(std::isnan(found.of_tracks->median));
+  EXPECT_EQ(found.of_tracks->num_missing,
+            static_cast<int64_t>(scene.track_elements.size()));
   EXPECT_EQ(Largest(model), Largest(scene));
+}
+
+// The errors that are told are those of what can be measured.
+TEST(SettleContradictions, TellsErrorsWithoutWhatDoesNotExist) {
+  const Model scene = ContradictoryScene();
+  Model model = scene;
+  int64_t num_missing = 0;
+  for (size_t e = 0; e < model.track_elements.size(); ++e) {
+    if (e % 3 == 0) continue;
+    model.track_elements[e].image_id = 4000;
+    ++num_missing;
+  }
+  const Contradictions found = SettleContradictions("auto", &model);
+  EXPECT_EQ(found.followed, "images");
+  EXPECT_EQ(found.of_tracks->num_missing, num_missing);
+  EXPECT_LT(found.of_tracks->max, 10);
+  EXPECT_EQ(found.of_images->num_missing, 0);
 }
 
 TEST(WorseImagesSide, IsThatOfAModelThatContradictsItselfAndFittedAlone) {

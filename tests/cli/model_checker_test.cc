@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <sstream>
 #include <string>
@@ -12,6 +14,7 @@
 #include "krot/model/rigs.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
+#include "tests/testing/edit_model.h"
 #include "tests/testing/scene_of.h"
 
 namespace krot::internal {
@@ -85,7 +88,7 @@ TEST_F(ModelCheckerCommand, ConvertsAModelThatIsNotInColmapsConventions) {
                  "poses from camera to world, camera axes (x right, y "
                  "up, z backward): converted, its median error falls "));
   EXPECT_THAT(result.out,
-              HasSubstr("Once that is put right: Nothing is wrong: all "));
+              HasSubstr("Once that is put right: nothing is wrong: all "));
   const Json report = ReadJson(folder_ / "r.json");
   EXPECT_TRUE(report["is_anything_wrong"]);
   EXPECT_EQ(report["conventions"]["camera_axes"], "x right, y up, z backward");
@@ -113,7 +116,7 @@ TEST_F(ModelCheckerCommand, PutsIntrinsicsRightThatAllImagesAskFor) {
               StartsWith("Camera 1 is wrong: its 8 images ask for the "
                          "principal point ("));
   EXPECT_THAT(result.out,
-              HasSubstr(" px. Once that is put right: Nothing is wrong: all "));
+              HasSubstr(" px. Once that is put right: nothing is wrong: all "));
   const Json map = ReadJson(folder_ / "r.json")["conventions"]["pixel_maps"][0];
   EXPECT_EQ(map["images"].size(), 8u);
   EXPECT_NEAR(map["cameras"][0]["params"][1], model.cameras[0].params[1] - 20,
@@ -220,6 +223,48 @@ TEST_F(ModelCheckerCommand, SaysWhatToRunNextAndThatRuns) {
               ElementsAre("model_checker", "bundle_adjuster"));
 }
 
+// Which has only one thing to do.
+TEST_F(ModelCheckerCommand, BeginsNoListOfStepsWithThen) {
+  const KrotResult result =
+      Succeeded(RunKrot({"model_checker", "--input_path", KROT_SAMPLE "/model",
+                         "--output_path", folder_ / "cured"}));
+  EXPECT_THAT(result.out, HasSubstr("\nNext\n  Adjust all that is left"));
+}
+
+// COLMAP passes over pairs that a database has matched already.
+TEST_F(ModelCheckerCommand, HasPairsMatchedAnewInACopyWithoutMatches) {
+  const Model model = Load(folder_ / "sound");
+  const Image& weak = model.images[7];
+  const auto from_first = [&](const Point2D& point) {
+    return std::hypot(point.x - weak.points2D[0].x,
+                      point.y - weak.points2D[0].y);
+  };
+  std::vector<double> distances;
+  for (const Point2D& point : weak.points2D) {
+    distances.push_back(from_first(point));
+  }
+  std::sort(distances.begin(), distances.end());
+  Save(Without(model,
+               [&](uint64_t e) {
+                 const TrackElement& element = model.track_elements[e];
+                 return element.image_id == weak.id &&
+                        from_first(weak.points2D[element.point2D_idx]) >
+                            distances[16];
+               }),
+       folder_ / "weak");
+  const KrotResult result =
+      Succeeded(Check("weak", {"--image_path", folder_ / "photos",
+                               "--html_path", folder_ / "r.html"}));
+  EXPECT_THAT(result.out, HasSubstr("colmap database_cleaner --type matches "
+                                    "--database_path MATCHED_DATABASE\n"));
+  EXPECT_THAT(result.out, HasSubstr("colmap exhaustive_matcher --database_path "
+                                    "MATCHED_DATABASE --SiftMatching.guided"));
+  EXPECT_THAT(result.out, HasSubstr("--FeatureMatching.guided_matching"));
+  EXPECT_THAT(result.out, HasSubstr("--database_path MATCHED_DATABASE "
+                                    "--image_path " +
+                                    (folder_ / "photos").string() + " "));
+}
+
 // As least squares leave the poses where observations are grossly wrong.
 TEST_F(ModelCheckerCommand, HasAModelThatIsNotAdjustedAdjustedFirst) {
   Model model = Load(folder_ / "sound");
@@ -320,6 +365,51 @@ TEST_F(WrongCameraCommand, IsToldByItsPlaceInTheRig) {
 TEST_F(ModelCheckerCommand, EndsWithCode9WhereAScriptAsks) {
   Succeeded(Check("faulty"));
   EXPECT_EQ(Check("faulty", {"--fail_on", "wrong"}).exit_code, 9);
+}
+
+TEST_F(ModelCheckerCommand, NamesAFocalLengthThatColmapsMapperDiscards) {
+  Model model = Load(folder_ / "sound");
+  Camera& camera = model.cameras[0];
+  // The same photos, cut out of far larger ones.
+  camera.width = 20 * camera.width;
+  Save(model, folder_ / "odd");
+  const KrotResult result = Succeeded(Check(
+      "odd", {"--report_path", folder_ / "r.json", "--fail_on", "wrong"}));
+  EXPECT_THAT(result.out,
+              HasSubstr("; but 1 camera has a focal length that COLMAP's "
+                        "mapper would discard.\n"));
+  EXPECT_THAT(result.out, HasSubstr("Camera 1: its focal length of 1024.00 px "
+                                    "is below 0.1 of its photos' larger side, "
+                                    "20480 px: "));
+  EXPECT_THAT(result.out, HasSubstr("--Mapper.min_focal_length_ratio"));
+  const Json discarded = ReadJson(folder_ / "r.json")["discarded_cameras"];
+  ASSERT_EQ(discarded.size(), 1u);
+  EXPECT_EQ(discarded[0]["camera_id"], 1);
+  EXPECT_EQ(discarded[0]["side_px"], 20480);
+  Succeeded(Check("sound", {"--report_path", folder_ / "r.json"}));
+  EXPECT_TRUE(ReadJson(folder_ / "r.json")["discarded_cameras"].empty());
+}
+
+// Five points of two images have as many coordinates as they and the second
+// pose have unknowns: whatever the model is, an adjustment leaves no errors.
+TEST_F(ModelCheckerCommand, SaysNothingWhereNoObservationChecksAnother) {
+  const Model scene = SynthesizeScene(SceneOf(2, 30, 2, 1)).ground_truth;
+  for (const size_t num : {1, 5, 6}) {
+    Save(Without(
+             scene,
+             [&](uint64_t e) { return e >= scene.points3D[num].track_begin; }),
+         folder_ / "few");
+    const KrotResult result =
+        Check("few", {"--output_type", "TXT", "--output_path",
+                      folder_ / "cured", "--overwrite", "1"});
+    if (num < 6) {
+      EXPECT_THAT(result, IsRefused(3, "krot model_checker",
+                                    "no observation is checked by another"))
+          << num;
+    } else {
+      Succeeded(result);
+    }
+  }
 }
 
 TEST_F(ModelCheckerCommand, RefusesWhatItCannotJudge) {

@@ -59,7 +59,9 @@ TEST_F(ToleranceAnalyzer, TellsTheSameInTableReportCsvAndPage) {
       {"--csv_path", folder_ / "boxes.csv", "--html_path", folder_ / "p.html",
        "--ToleranceAnalyzer.images",
        model_.images[1].name + "," + std::to_string(model_.images[2].id),
-       "--ToleranceAnalyzer.points", point}));
+       "--ToleranceAnalyzer.points", point, "--log_level", "2"}));
+  EXPECT_THAT(result.err, HasSubstr("box 1 of 3"));
+  EXPECT_THAT(result.err, Not(HasSubstr("box 0 of")));
   EXPECT_THAT(result.out, HasSubstr(model_.images[1].name));
   EXPECT_THAT(result.out, HasSubstr("point " + point));
   const Json report = Report();

@@ -1,5 +1,6 @@
 #include "krot/report/reports.h"
 
+#include <cmath>
 #include <optional>
 
 #include <gmock/gmock.h>
@@ -10,6 +11,7 @@ namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Matches;
 using ::testing::Not;
 
 SolveReport SomeReport() {
@@ -458,6 +460,58 @@ TEST(CheckSentence, GivesNoNumberOfAFarFocalLength) {
   EXPECT_THAT(CheckSentence(ReportOfCamera(1100)), HasSubstr("about 1100.0"));
   EXPECT_THAT(CheckSentence(ReportOfCamera(300)), HasSubstr("far shorter"));
   EXPECT_THAT(CheckSentence(ReportOfCamera(2000)), HasSubstr("far longer"));
+}
+
+// Their mean stands in no file.
+TEST(CheckSentence, GivesBothFocalLengthsOfACameraWithTwo) {
+  CheckReport report = ReportOfCamera(1010);
+  report.check.cameras[0].focal_lengths_px = {900, 1100};
+  EXPECT_THAT(CheckSentence(report),
+              HasSubstr("its focal lengths are 900.0 and 1100.0 px, and its 3 "
+                        "images ask for others, about 1010.0 px in the mean"));
+  report.check.cameras[0].focal_lengths_px = {1000, 1000};
+  EXPECT_THAT(CheckSentence(report), HasSubstr("focal length is 1000.0 px"));
+}
+
+TEST(CheckSentence, BeginsNoSentenceAnewAfterAColon) {
+  CheckReport report;
+  report.check.sigma_px = 0.5;
+  report.check.is_adjusted = false;
+  report.check.conventions.emplace();
+  EXPECT_THAT(CheckSentence(report),
+              HasSubstr("put right: the model is not adjusted"));
+}
+
+TEST(ContradictionSentence, DoesNotCountWhatIsMissingAmongErrors) {
+  Contradictions contradictions;
+  contradictions.num_track_elements = 9;
+  contradictions.of_tracks = Contradictions::Fit{0.5, 2, 7};
+  EXPECT_THAT(ContradictionSentence(contradictions),
+              HasSubstr("the tracks' observations have a median error of "
+                        "0.5000 px and a largest of 2.0000 px (beside 7 of "
+                        "images or 2D points that the model lacks)"));
+  contradictions.of_tracks->median = std::nan("");
+  EXPECT_THAT(ContradictionSentence(contradictions),
+              HasSubstr("all of the tracks' observations are of images or 2D "
+                        "points that the model lacks"));
+}
+
+TEST(CheckTable, SaysWhereTheCuredModelHasALargerError) {
+  CheckReport check;
+  OutlierReport filter;
+  const auto says = HasSubstr(
+      "The largest error of what is written, 5.0000 px, is above that of what "
+      "was read, 4.0000 px");
+  for (const double after : {5.0, 3.0}) {
+    for (PixelErrorStatistics* errors :
+         {&check.pixel_error_after, &filter.summary.pixel_error_after}) {
+      errors->max = after;
+    }
+    check.pixel_error_before.max = 4;
+    filter.summary.pixel_error_before.max = 4;
+    EXPECT_EQ(Matches(says)(CheckTable(check, 10)), after > 4);
+    EXPECT_EQ(Matches(says)(OutlierTable(filter)), after > 4);
+  }
 }
 
 TEST(CheckSentence, NamesGroupsAndPointsBesideObservations) {

@@ -151,6 +151,7 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
   report.input_path = paths.input_path;
   report.output_path = paths.output_path;
   report.database_path = command.database_path;
+  report.image_path = command.image_path;
   const Model model =
       ReadInput(paths, log, &report.run, command.database_path.empty());
 
@@ -165,12 +166,14 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
   BeginPhase(log, "checking its images and observations");
   const Timer check_timer;
   report.check = CheckModel(model, options, command.context);
+  if (!report.check.conventions) report.discarded = FindDiscardedCameras(model);
   if (!report.check.sigma_px && !HasDecidedPair(report.check)) {
     throw CommandError(
         kExitNothingToSolve,
         "nothing to check: no observation is checked by another one, as there "
-        "are no positions or no tracks of two and more images; krot solver "
-        "makes positions from rotations and tracks");
+        "are no positions, no tracks of two and more images, or no more "
+        "coordinates than unknowns; krot solver makes positions from rotations "
+        "and tracks");
   }
   const ModelCure cure =
       CureModel(model, report.check, options, command.context);

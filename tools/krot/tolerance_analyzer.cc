@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -91,7 +92,8 @@ ToleranceResult Analyze(const ToleranceCommand& command, const Model& model) {
     ShowProgress(
         log, {"boxes",
               (options.distances.empty() ? "box " : "box or length ") +
-                  std::to_string(num_done) + " of " + std::to_string(num_boxes),
+                  std::to_string(std::min(num_done + 1, num_boxes)) + " of " +
+                  std::to_string(num_boxes),
               static_cast<double>(num_done) / static_cast<double>(num_boxes)});
   };
   const auto num_lengths = static_cast<int64_t>(options.distances.size());

@@ -11,6 +11,7 @@
 
 #include "krot/analysis/model_input.h"
 #include "krot/analysis/noise.h"
+#include "krot/camera/camera_model.h"
 #include "krot/check.h"
 #include "krot/context.h"
 #include "krot/model.h"
@@ -334,6 +335,14 @@ ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
   const Model& read = converted ? *converted : model;
   ModelCheck check = CheckConverted(read, options, context);
   check.conventions = conventions;
+  for (WrongCamera& wrong : check.cameras) {
+    if (wrong.fault != CameraFault::kFocalLength) continue;
+    const Camera& camera =
+        read.cameras[*IdIndex<CameraId>(read.cameras).Find(wrong.camera_id)];
+    const auto first = camera.params.begin();
+    wrong.focal_lengths_px.assign(
+        first, first + FindCameraModel(camera.model_id)->num_focal_lengths());
+  }
   if (check.sigma_px && !context.IsCancelled()) {
     check.fits = Fits(read, *check.sigma_px);
     if (check.fits && check.is_adjusted) {

@@ -15,8 +15,7 @@
 namespace krot::internal {
 namespace {
 
-// Relative to the median image's standard deviation.
-constexpr double kWeaklyHeld = 10;
+constexpr double kWeaklyHeld = 10;  // x the median image's standard deviation
 
 class Checker {
  public:
@@ -52,15 +51,16 @@ class Checker {
     for (;;) {
       // A wrong camera's images must not be taken for images far off.
       snooping_ = SnoopNoise(model_, noise_options_, context_, !judges_cameras);
-      if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
+      if (context_.IsCancelled() || !HasRedundancy(model_, snooping_.noise))
+        return check_;
       Count();
       sums_ = AddUpFrames(model_, snooping_.noise);
       check_.is_adjusted = IsAdjusted();
       if (judges_cameras) {
         JudgeCameras();
         judges_cameras = !check_.cameras.empty();
-        const bool is_above_filter = *snooping_.noise.sigma_px > kFilteredPx;
-        if (is_above_filter && !judges_cameras) continue;
+        if (*snooping_.noise.sigma_px > kFilteredPx && !judges_cameras)
+          continue;
       }
       // Images that go must not change what is taken for noise.
       if (!snooping_.has_common_noise)

@@ -22,7 +22,8 @@ namespace krot::internal {
 namespace {
 
 struct SideFit {
-  Contradictions::Fit px;
+  Contradictions::Fit px;      // what does not exist counts as infinite
+  Contradictions::Fit told;    // without it
   double relative_median = 0;  // to the image's larger side
   int64_t count = 0;
   bool is_any_finite = false;
@@ -52,6 +53,12 @@ std::optional<SideFit> Measure(const Model& model, int64_t num_unknown) {
   fit.count = static_cast<int64_t>(px.size());
   fit.px.max = *std::max_element(px.begin(), px.end());
   fit.px.median = Median(px);
+  px.erase(px.begin(), px.begin() + num_unknown);
+  fit.told = {kNaN, kNaN, num_unknown};
+  if (!px.empty()) {
+    fit.told.max = *std::max_element(px.begin(), px.end());
+    fit.told.median = Median(std::move(px));
+  }
   fit.relative_median = Median(relative);
   return fit;
 }
@@ -130,8 +137,8 @@ Contradictions SettleContradictions(const std::string& on_contradiction,
   if (!has_positions || !(HasTrack(by_tracks) || HasTrack(by_images))) {
     tracks = images = std::nullopt;
   }
-  if (tracks) found.of_tracks = tracks->px;
-  if (images) found.of_images = images->px;
+  if (tracks) found.of_tracks = tracks->told;
+  if (images) found.of_images = images->told;
   if (on_contradiction == "follow_tracks") {
     found.followed = "tracks";
     return found;

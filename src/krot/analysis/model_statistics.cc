@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <tuple>
 #include <unordered_map>
 #include <utility>
@@ -174,6 +175,28 @@ std::map<int64_t, int64_t> TrackLengthHistogram(const Model& model) {
     ++histogram[static_cast<int64_t>(point.track_end - point.track_begin)];
   }
   return histogram;
+}
+
+std::vector<DiscardedCamera> FindDiscardedCameras(const Model& model) {
+  std::set<CameraId> seen;
+  for (const int32_t n : ImagesOfElements(model)) {
+    seen.insert(model.images[n].camera_id);
+  }
+  std::vector<DiscardedCamera> discarded;
+  for (const Camera& camera : model.cameras) {
+    const CameraModelInfo& info = *FindCameraModel(camera.model_id);
+    const uint64_t side = std::max(camera.width, camera.height);
+    if (seen.count(camera.id) == 0 || side == 0 || !info.has_image_plane) {
+      continue;
+    }
+    for (int i = 0; i < info.num_focal_lengths(); ++i) {
+      const double ratio = camera.params[i] / static_cast<double>(side);
+      if (ratio >= 0.1 && ratio <= 10) continue;
+      discarded.push_back({camera.id, camera.params[i], side});
+      break;
+    }
+  }
+  return discarded;
 }
 
 std::vector<std::optional<OddFocalLength>> FindOddFocalLengths(

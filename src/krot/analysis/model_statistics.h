@@ -82,6 +82,17 @@ struct OddFocalLength {
 std::vector<std::optional<OddFocalLength>> FindOddFocalLengths(
     const Model& model);
 
+// A camera that COLMAP's mapper discards with its images, as a focal length is
+// below 0.1 or above 10 of the image's larger side (Mapper's
+// min_focal_length_ratio and max_focal_length_ratio).
+struct DiscardedCamera {
+  CameraId camera_id = 0;
+  double focal_length_px = 0;
+  uint64_t side_px = 0;
+};
+// Of the cameras that images with observations have.
+std::vector<DiscardedCamera> FindDiscardedCameras(const Model& model);
+
 // Zeros if there are no values.
 struct ValueRange {
   double min = 0;

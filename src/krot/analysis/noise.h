@@ -246,6 +246,10 @@ std::vector<PoseSums> AddUpFrames(const Model& model, const ModelNoise& noise);
 std::vector<char> HaveBarePoses(const Model& model,
                                 const std::vector<ImageGeometry>& geometries);
 
+// Whether noise is known, and tested observations have more coordinates than
+// what they determine: points, and poses of frames up to a similarity.
+bool HasRedundancy(const Model& model, const ModelNoise& noise);
+
 // CheckModel of a model in COLMAP's conventions.
 ModelCheck CheckConverted(const Model& model, const ModelCheckOptions& options,
                           const Context& context);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -321,6 +322,24 @@ std::vector<char> HaveBarePoses(const Model& model,
     is_bare.push_back(geometry.has_pose && is_held[geometry.frame] == 0);
   }
   return is_bare;
+}
+
+bool HasRedundancy(const Model& model, const ModelNoise& noise) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
+  std::set<int32_t> frames;
+  int64_t redundancy = 7;
+  for (const Point3D& point : model.points3D) {
+    bool is_seen = false;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      if (noise.observations[e].num_controlled == 0) continue;
+      frames.insert(geometries[image_of[e]].frame);
+      redundancy += 2;
+      is_seen = true;
+    }
+    if (is_seen) redundancy -= 3;
+  }
+  return noise.sigma_px && redundancy > 6 * static_cast<int64_t>(frames.size());
 }
 
 Vector3d TrackNoise::Point(int64_t k) const {

@@ -32,6 +32,9 @@ struct Contradictions {
   struct Fit {
     double median = 0;
     double max = 0;
+    // Beside these, observations of images or 2D points that do not exist. The
+    // errors are NaN if there are no others.
+    int64_t num_missing = 0;
   };
   // Set by SettleContradictions, with `followed`: "tracks", "images", "both" or
   // "neither"; "" if not settled. None if nothing can be measured.

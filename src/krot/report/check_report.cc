@@ -1,6 +1,7 @@
 #include "krot/report/reports.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <vector>
 
@@ -101,7 +102,9 @@ std::string NextSteps(const CheckReport& report) {
   const std::string input = or_name(report.input_path, "MODEL");
   const std::string cured = or_name(report.output_path, "CURED");
   const std::string database = or_name(report.database_path, "DATABASE");
-  std::string text = "\nNext\n";
+  const std::string images = or_name(report.image_path, "IMAGES");
+  const std::string head = "\nNext\n";
+  std::string text = head;
   const bool is_converted = check.conventions.has_value();
   if (report.output_path.empty() &&
       (is_converted ||
@@ -161,71 +164,43 @@ std::string NextSteps(const CheckReport& report) {
                   })) {
     text +=
         "  Where one camera took all photos, give COLMAP one, so that its "
-        "focal length is fitted to\n  all of them; then map anew:\n    colmap "
-        "feature_extractor --ImageReader.single_camera 1 --database_path " +
-        database + " --image_path IMAGES\n";
+        "focal length is fitted to\n  all of them, in a new database; then "
+        "match and map anew:\n    colmap feature_extractor "
+        "--ImageReader.single_camera 1 --database_path NEW_DATABASE "
+        "--image_path " +
+        images + "\n";
   }
   if (num_weak > 0 || !check.parts.empty()) {
     text += "  More matches" +
             std::string(num_weak > 0 ? " for the weakly held images" : "") +
             (num_weak > 0 && !check.parts.empty() ? " and" : "") +
             (check.parts.empty() ? "" : " between the parts") +
-            ", and their points:\n    "
-            "colmap exhaustive_matcher --database_path " +
-            database + " --SiftMatching.guided_matching 1\n" +
-            Folder("TRIANGULATED") + "    colmap point_triangulator " +
-            "--database_path " + database +
-            " --image_path IMAGES --input_path " + model +
-            " --output_path TRIANGULATED\n";
+            ", and their points. COLMAP matches no pair twice, so a copy of "
+            "the\n  database loses its matches first (from COLMAP 3.13 on\n  "
+            "--FeatureMatching.guided_matching 1):\n    cp " +
+            database +
+            " MATCHED_DATABASE\n    colmap database_cleaner --type " +
+            "matches --database_path MATCHED_DATABASE\n    colmap " +
+            "exhaustive_matcher --database_path MATCHED_DATABASE " +
+            "--SiftMatching.guided_matching 1\n" + Folder("TRIANGULATED") +
+            "    colmap point_triangulator " +
+            "--database_path MATCHED_DATABASE --image_path " + images +
+            " --input_path " + model + " --output_path TRIANGULATED\n";
     model = "TRIANGULATED";
   }
+  text += text == head ? "  Adjust all that is left"
+                       : "  Then adjust all that is left";
   if (!check.cauchy_scale_px) {
-    return text + "  Then adjust all that is left:\n" + Folder("ADJUSTED") +
+    return text + ":\n" + Folder("ADJUSTED") +
            "    colmap bundle_adjuster --input_path " + model +
            " --output_path ADJUSTED\n";
   }
   return text +
-         "  Then adjust all that is left, with the loss that suits errors with "
-         "such tails\n  (colmap bundle_adjuster of COLMAP 4 has these options, "
+         ", with the loss that suits errors with such tails\n  (colmap "
+         "bundle_adjuster of COLMAP 4 has these options, "
          "too):\n" +
          RobustAdjustment(report, model);
 }
-
-}  // namespace
-
-std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
-  if (image.verdict == ImageVerdict::kWeaklyHeld) {
-    return "its centre may move more than ten times as far as the median "
-           "image's" +
-           TextIf(image.num_wrong > image.num_tested / 10,
-                  ", and " + std::to_string(image.num_wrong) +
-                      " of its observations contradict: it may be misplaced");
-  }
-  switch (image.fault) {
-    case ImageFault::kMatches:
-      return "its matches contradict its " +
-             PoseFaultWords(check.pairs->images[&image - check.images.data()]);
-    case ImageFault::kLens:
-      return "its own camera's focal length is " +
-             Pixels(image.focal_length_px, 0) + ", the others' " +
-             Pixels(image.others_focal_length_px, 0);
-    case ImageFault::kContradicted:
-      return "most of them contradict the others";
-    case ImageFault::kMisplaced:
-      return "another pose would halve its squared errors";
-    case ImageFault::kChance:
-      return "they fit no better than chance matches";
-    case ImageFault::kUnsupported:
-      return "too few of its 2D points agree with 3D points to hold its pose";
-    case ImageFault::kNone:
-      break;
-  }
-  return image.verdict == ImageVerdict::kNotJudged
-             ? "has no 2D points: its pose cannot be checked"
-             : "";
-}
-
-namespace {
 
 // What contradicts by more than noise; empty if nothing does.
 std::string WhatContradicts(const CheckReport& report) {
@@ -294,6 +269,13 @@ std::string NothingIsWrong(const CheckReport& report) {
                                   " weakly held");
 }
 
+// None of these sentences begins with a name.
+std::string AfterColon(std::string sentence) {
+  sentence[0] =
+      static_cast<char>(std::tolower(static_cast<unsigned char>(sentence[0])));
+  return sentence;
+}
+
 std::string ForAdjusted(const CheckReport& report) {
   const ModelCheck& check = report.check;
   std::string text = WhatContradicts(report);
@@ -320,6 +302,11 @@ std::string ForAdjusted(const CheckReport& report) {
   if (!check.parts.empty()) {
     text += (check.IsAnythingWrong() ? "; and " : "; but ") +
             Counted(check.parts.size(), "part", "is", "are") + " loose";
+  }
+  if (!report.discarded.empty()) {
+    text += (check.IsAnythingWrong() ? "; and " : "; but ") +
+            Counted(report.discarded.size(), "camera", "has", "have") +
+            " a focal length that COLMAP's mapper would discard";
   }
   const int64_t num_bare = check.NumImages(ImageVerdict::kNotJudged);
   if (num_bare > 0) {
@@ -349,17 +336,17 @@ std::string ConvertedSentence(const CheckReport& report) {
   }
   return (is_camera ? CamerasSentence(check)
                     : "The model is not adjusted, so adjust it first.") +
-         " As it stands: " + ForAdjusted(report);
+         " As it stands: " + AfterColon(ForAdjusted(report));
 }
 
 }  // namespace
 
 std::string CheckSentence(const CheckReport& report) {
   const auto& conventions = report.check.conventions;
-  return (conventions
-              ? ConventionsSentence(*conventions) + " Once that is put right: "
-              : "") +
-         ConvertedSentence(report);
+  const std::string sentence = ConvertedSentence(report);
+  if (!conventions) return sentence;
+  return ConventionsSentence(*conventions) +
+         " Once that is put right: " + AfterColon(sentence);
 }
 
 std::string CheckTable(const CheckReport& report, int max_rows) {
@@ -374,7 +361,10 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
           TextIf(num_bare > 0, ", " + Thousands(num_bare) + " not judged") +
           ". Observations that others check: " + Thousands(check.num_tested) +
           ".\n";
-  text += NotJudgedSentence(check) + SamePhotosSentence(check);
+  text +=
+      RaisedMaxSentence(report.pixel_error_before, report.pixel_error_after) +
+      DiscardedSentence(report) + NotJudgedSentence(check) +
+      SamePhotosSentence(check);
   if (!check.parts.empty()) text += PartsSentence(check) + "\n";
   if (!check.is_adjusted && check.cameras.empty()) {
     text +=

@@ -180,6 +180,24 @@ Json PoseJson(const PoseConventions& one) {
 
 }  // namespace
 
+std::string DiscardedSentence(const CheckReport& report) {
+  if (report.discarded.empty()) return "";
+  const DiscardedCamera& first = report.discarded.front();
+  const bool is_short =
+      first.focal_length_px < static_cast<double>(first.side_px);
+  const size_t num_more = report.discarded.size() - 1;
+  return "Camera " + std::to_string(first.camera_id) +
+         ": its focal length of " + Pixels(first.focal_length_px, 2) + " is " +
+         (is_short ? "below 0.1" : "above 10") +
+         " of its photos' larger side, " + std::to_string(first.side_px) +
+         " px: COLMAP's mapper would discard such a camera (--Mapper." +
+         (is_short ? "min" : "max") + "_focal_length_ratio)" +
+         TextIf(num_more > 0, ", and " + Counted(num_more, "other")) +
+         ". Unless its lens is like that, write the true one into cameras.txt "
+         "and adjust the model with it held (krot bundle_adjuster "
+         "--BundleAdjustment.refine_focal_length 0).\n";
+}
+
 std::string ConventionsSentence(const Conventions& one) {
   const std::string falls = " median error falls from " +
                             FormatNumber(one.median_error_as_read_px, 2) +

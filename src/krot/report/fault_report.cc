@@ -54,6 +54,14 @@ std::string CameraFaultWords(const WrongCamera& camera) {
           ratio > 1.2   ? "a far longer one"
           : ratio < 0.8 ? "a far shorter one"
                         : "about " + Pixels(camera.asked_focal_length_px, 1);
+      const std::vector<double>& own = camera.focal_lengths_px;
+      if (own.size() == 2 && own[0] != own[1]) {
+        return "its focal lengths are " + FormatNumber(own[0], 1) + " and " +
+               Pixels(own[1], 1) + ", and " + ask +
+               (ratio > 1.2   ? "far longer ones"
+                : ratio < 0.8 ? "far shorter ones"
+                              : "others, " + asked + " in the mean");
+      }
       return "its focal length is " + Pixels(camera.focal_length_px, 1) +
              ", and " + ask + asked;
     }
@@ -74,6 +82,38 @@ std::string CameraFaultWords(const WrongCamera& camera) {
 }
 
 }  // namespace
+
+std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
+  if (image.verdict == ImageVerdict::kWeaklyHeld) {
+    return "its centre may move more than ten times as far as the median "
+           "image's" +
+           TextIf(image.num_wrong > image.num_tested / 10,
+                  ", and " + std::to_string(image.num_wrong) +
+                      " of its observations contradict: it may be misplaced");
+  }
+  switch (image.fault) {
+    case ImageFault::kMatches:
+      return "its matches contradict its " +
+             PoseFaultWords(check.pairs->images[&image - check.images.data()]);
+    case ImageFault::kLens:
+      return "its own camera's focal length is " +
+             Pixels(image.focal_length_px, 0) + ", the others' " +
+             Pixels(image.others_focal_length_px, 0);
+    case ImageFault::kContradicted:
+      return "most of them contradict the others";
+    case ImageFault::kMisplaced:
+      return "another pose would halve its squared errors";
+    case ImageFault::kChance:
+      return "they fit no better than chance matches";
+    case ImageFault::kUnsupported:
+      return "too few of its 2D points agree with 3D points to hold its pose";
+    case ImageFault::kNone:
+      break;
+  }
+  return image.verdict == ImageVerdict::kNotJudged
+             ? "has no 2D points: its pose cannot be checked"
+             : "";
+}
 
 std::string PartsSentence(const ModelCheck& check) {
   const auto apart = PointersIf(check.parts, IsApart);
@@ -328,6 +368,11 @@ std::string CheckJson(const CheckReport& report) {
       {"database", JsonIf(check.pairs, PairJson)},
       {"moved_images", report.moved},
       {"cameras", CamerasJson(check)},
+      {"discarded_cameras",
+       ListJson(report.discarded,
+                [](const DiscardedCamera& one) -> Json {
+                  return KROT_JSON_OF(one, camera_id, focal_length_px, side_px);
+                })},
       {"images", ListJson(check.images, of_image)},
       {"observations", ListJson(check.observations, of_observation)},
       {"tracks", ListJson(check.tracks, TwoPointsJson)},

@@ -276,7 +276,9 @@ std::string OutlierTable(const OutlierReport& report) {
   TextTable errors({"", "before", "after"});
   AddErrorColumns({summary.pixel_error_before, summary.pixel_error_after},
                   &errors);
-  text += "\nReprojection errors, pixels\n" + errors.ToString();
+  text +=
+      "\nReprojection errors, pixels\n" + errors.ToString() +
+      RaisedMaxSentence(summary.pixel_error_before, summary.pixel_error_after);
   text += NoiseSentence(summary) + SnoopingSentences(summary);
   if (summary.profile) text += ProfileTable(*summary.profile);
   text += SuspectTable(summary) + RotationSentence(summary) + "\n";

@@ -108,12 +108,14 @@ struct CheckReport {
   PixelErrorStatistics pixel_error_after;  // of the cured model
   std::vector<std::string> moved;          // ModelCure
   bool has_panorama = false;
-  double seconds_check = 0;  // wall clock
+  std::vector<DiscardedCamera> discarded;  // of the input
+  double seconds_check = 0;                // wall clock
   // For the commands that NextSteps suggests; if empty, a name in capitals is
   // printed instead.
   std::string input_path;
   std::string output_path;
   std::string database_path;
+  std::string image_path;
 };
 
 // For example "By the matches 39 of 249 pairs of images contradict the poses: 3
@@ -148,6 +150,9 @@ std::string SigmaText(double sigma);
 // What too few tracks tie to the rest of a model; "" if all is tied.
 std::string PartsSentence(const ModelCheck& check);
 
+// Names the first camera that COLMAP's mapper would discard, and what to do; ""
+// if there is none.
+std::string DiscardedSentence(const CheckReport& report);
 // Names the images that nothing can check, and pairs that are the same photo,
 // one line each; "" if there are none.
 std::string NotJudgedSentence(const ModelCheck& check);

@@ -67,13 +67,23 @@ std::string LoosePointsSentence(const std::vector<LoosePoint>& points) {
 std::string FitWords(const char* whose,
                      const std::optional<Contradictions::Fit>& fit) {
   if (!fit) return std::string(whose) + " side has no observations";
+  if (std::isnan(fit->median)) {
+    return "all of " + std::string(whose) +
+           " observations are of images or 2D points that the model lacks";
+  }
+  const std::string missing =
+      TextIf(fit->num_missing > 0, " (beside " + Thousands(fit->num_missing) +
+                                       " of images or 2D points that the "
+                                       "model lacks)");
   if (!std::isfinite(fit->median)) {
-    return "most of " + std::string(whose) + " observations do not project";
+    return "most of " + std::string(whose) + " observations do not project" +
+           missing;
   }
   return std::string(whose) + " observations have a median error of " +
          Pixels(fit->median) +
          TextIf(std::isfinite(fit->max),
-                " and a largest of " + Pixels(fit->max));
+                " and a largest of " + Pixels(fit->max)) +
+         missing;
 }
 
 std::string FollowedWords(const std::string& followed) {
@@ -151,6 +161,15 @@ std::string WorseImagesWords(const std::pair<double, double>& max_px) {
          Pixels(max_px.first) + " to " +
          (std::isfinite(max_px.second) ? Pixels(max_px.second)
                                        : "points that do not project");
+}
+
+std::string RaisedMaxSentence(const PixelErrorStatistics& before,
+                              const PixelErrorStatistics& after) {
+  return TextIf(after.max > before.max,
+                "The largest error of what is written, " + Pixels(after.max) +
+                    ", is above that of what was read, " + Pixels(before.max) +
+                    ": points moved to fit the observations that are left. An "
+                    "adjustment or krot solver lowers it.\n");
 }
 
 std::string WholeCollapseWords(const Collapse& collapse) {

@@ -46,6 +46,11 @@ void RequireSettled(const std::string& path,
 // after, pixels.
 std::string WorseImagesWords(const std::pair<double, double>& max_px);
 
+// Says that the largest error has risen, and why, where observations were left
+// out; "" if it has not.
+std::string RaisedMaxSentence(const PixelErrorStatistics& before,
+                              const PixelErrorStatistics& after);
+
 // For example "the errors fall only where all 1721 points that two cameras see
 // lie in one place, so that nothing is left of the scene". Requires IsWhole().
 std::string WholeCollapseWords(const Collapse& collapse);
