@@ -363,7 +363,7 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
           ".\n";
   text +=
       RaisedMaxSentence(report.pixel_error_before, report.pixel_error_after) +
-      DiscardedSentence(report) + NotJudgedSentence(check) +
+      DiscardedSentence(report.discarded) + NotJudgedSentence(check) +
       SamePhotosSentence(check);
   if (!check.parts.empty()) text += PartsSentence(check) + "\n";
   if (!check.is_adjusted && check.cameras.empty()) {

@@ -180,12 +180,12 @@ Json PoseJson(const PoseConventions& one) {
 
 }  // namespace
 
-std::string DiscardedSentence(const CheckReport& report) {
-  if (report.discarded.empty()) return "";
-  const DiscardedCamera& first = report.discarded.front();
+std::string DiscardedSentence(const std::vector<DiscardedCamera>& discarded) {
+  if (discarded.empty()) return "";
+  const DiscardedCamera& first = discarded.front();
   const bool is_short =
       first.focal_length_px < static_cast<double>(first.side_px);
-  const size_t num_more = report.discarded.size() - 1;
+  const size_t num_more = discarded.size() - 1;
   return "Camera " + std::to_string(first.camera_id) +
          ": its focal length of " + Pixels(first.focal_length_px, 2) + " is " +
          (is_short ? "below 0.1" : "above 10") +

@@ -45,9 +45,7 @@ std::string AdjustedDistanceTable(const DistanceComparison& comparison);
 // For the terminal: errors before and after, what took part, why it ended.
 std::string AdjustmentTable(const AdjustmentReport& report);
 
-// What is not to be relied on, and what to do about it: intrinsics that are not
-// determined, where the precision is known, and an end far from a minimum.
-// `model` is the one that is written.
+// What is not to be relied on in what is written, `model`, and what to do.
 std::vector<std::string> AdjustmentWarnings(const AdjustmentReport& report,
                                             const Model& model);
 
@@ -149,14 +147,6 @@ std::string SigmaText(double sigma);
 
 // What too few tracks tie to the rest of a model; "" if all is tied.
 std::string PartsSentence(const ModelCheck& check);
-
-// Names the first camera that COLMAP's mapper would discard, and what to do; ""
-// if there is none.
-std::string DiscardedSentence(const CheckReport& report);
-// Names the images that nothing can check, and pairs that are the same photo,
-// one line each; "" if there are none.
-std::string NotJudgedSentence(const ModelCheck& check);
-std::string SamePhotosSentence(const ModelCheck& check);
 std::string PartTable(const ModelCheck& check, size_t max_rows);
 // How the model's numbers are to be read.
 std::string ConventionsSentence(const Conventions& conventions);

@@ -8,7 +8,9 @@
 
 #include "krot/analysis/model_comparison.h"
 #include "krot/analysis/model_input.h"
+#include "krot/analysis/model_statistics.h"
 #include "krot/base/context.h"
+#include "krot/check.h"
 #include "krot/model/model_checks.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/report/text_table.h"
@@ -45,6 +47,13 @@ void RequireSettled(const std::string& path,
 // largest error rises from 1.0973 px to 131.9991 px". `max_px`: before and
 // after, pixels.
 std::string WorseImagesWords(const std::pair<double, double>& max_px);
+
+// These name the first camera that COLMAP's mapper would discard and what to
+// do, the images that nothing can check, and pairs that are the same photo; ""
+// without any.
+std::string DiscardedSentence(const std::vector<DiscardedCamera>& discarded);
+std::string NotJudgedSentence(const ModelCheck& check);
+std::string SamePhotosSentence(const ModelCheck& check);
 
 // Says that the largest error has risen, and why, where observations were left
 // out; "" if it has not.
