@@ -59,11 +59,11 @@ struct ObservationNoise {
   // How many directions are controlled (eigenvalue of at least kControlled): 2;
   // 1 in a track of two or where all rays are in a plane; or 0.
   int num_controlled = 0;
-  // The standardised error, over the controlled directions. If only one is
-  // controlled, it is converted to the w of two directions that has the same
-  // probability of being exceeded. Infinite if the point is not in front of the
-  // camera or is in it, nearer than a billionth of the median camera's
-  // distance from the middle of the cameras; NaN if no direction is controlled.
+  double relative_sigma = 1;  // NoiseOptions::relative_sigmas
+  // The standardised error over the controlled directions; if only one is, the
+  // w of two that is exceeded with the same probability. Infinite if the point
+  // is not in front of the camera or is in it, nearer than a billionth of the
+  // median camera's distance from the middle of the cameras; NaN if none is.
   double w = 0;
 };
 

@@ -169,15 +169,18 @@ TEST(FindWrongCameras, FindsTheDistortionOfOneOfTwoCameras) {
   EXPECT_EQ(check.cameras[0].fault, CameraFault::kDistortion);
 }
 
-// The errors of a model after small steps: three numbers each by which frames
+// The errors of a model, each divided by its relative sigma, after small steps
+// from where `noise` has its points: three numbers each by which frames
 // turn and move, the same of the second camera's place, and three of each
 // point.
 class Linearized {
  public:
-  Linearized(const Model& model, const std::vector<Vector3d>& points)
-      : model_(model), image_of_(ImagesOfElements(model)) {
-    for (size_t k = 0; k < points.size(); ++k)
-      model_.points3D[k].xyz = points[k];
+  // Keeps a reference to noise.
+  Linearized(const Model& model, const ModelNoise& noise)
+      : model_(model), noise_(noise), image_of_(ImagesOfElements(model)) {
+    for (size_t k = 0; k < noise.points.size(); ++k) {
+      model_.points3D[k].xyz = noise.points[k];
+    }
   }
 
   VectorXd Errors() const {
@@ -189,9 +192,11 @@ class Linearized {
         const Point2D& pixel =
             model_.images[image_of_[e]]
                 .points2D[model_.track_elements[e].point2D_idx];
-        errors.segment<2>(static_cast<Eigen::Index>(2 * e)) = *ProjectionError(
-            model_.cameras[geometry.camera], {pixel.x, pixel.y},
-            geometry.cam_from_world * point.xyz);
+        errors.segment<2>(static_cast<Eigen::Index>(2 * e)) =
+            *ProjectionError(model_.cameras[geometry.camera],
+                             {pixel.x, pixel.y},
+                             geometry.cam_from_world * point.xyz) /
+            noise_.observations[e].relative_sigma;
       }
     }
     return errors;
@@ -249,14 +254,20 @@ class Linearized {
 
  private:
   Model model_;
+  const ModelNoise& noise_;
   const std::vector<int32_t> image_of_;
 };
 
-TEST(FindWrongCameras, GainsWhatFreeingTheCameraTakesFromTheSumOfSquares) {
+// Of FindWrongCameras, with noise of the same size everywhere or of sizes that
+// are known.
+void ExpectGainOfSquares(const std::vector<double>& sizes) {
   Model model = RigScene(2, 5, 60);
   Pose& place = PlaceOf(&model, 1);
   place = Turned(place, {0.02, 0.01, -0.01}, {0.001, 0, 0});
   NoiseOptions options;
+  for (size_t e = 0; e < model.track_elements.size() && !sizes.empty(); ++e) {
+    options.relative_sigmas.push_back(sizes[e % sizes.size()]);
+  }
   const ModelNoise noise = EstimateNoise(model, options, {});
   ASSERT_EQ(noise.num_tested,
             static_cast<int64_t>(model.track_elements.size()));
@@ -270,10 +281,18 @@ TEST(FindWrongCameras, GainsWhatFreeingTheCameraTakesFromTheSumOfSquares) {
   for (size_t n = 0; n < sums.size(); ++n) {
     if (geometries[n].sensor == 1) square += sums[n].square;
   }
-  Linearized linearized(model, noise.points);
+  Linearized linearized(model, noise);
   const double fall = linearized.Fall(true) - linearized.Fall(false);
   EXPECT_LT(fall, square);
   EXPECT_NEAR(wrong[0].gain, fall / square, 1e-4);
+}
+
+TEST(FindWrongCameras, GainsWhatFreeingTheCameraTakesFromTheSumOfSquares) {
+  ExpectGainOfSquares({});
+}
+
+TEST(FindWrongCameras, WeighsObservationsByTheSizeOfTheirNoise) {
+  ExpectGainOfSquares({0.5, 1, 2, 4, 0.7, 1.5, 3});
 }
 
 }  // namespace

@@ -292,9 +292,11 @@ class CameraChecker {
       if (rows.empty()) continue;
       const Matrix3d root = PoseRows::RootOf(rows);
       of_track.clear();
+      Vector3d G_e = Vector3d::Zero();
       for (const PoseRow& row : rows) {
         lengths.push_back(row.x_cam.norm());
         const Matrix23 Q = row.F.rightCols<3>() * root;
+        G_e += Q.transpose() * row.error;
         for (const auto& [n, C] : shared_.ByGroups(row)) {
           D[n] += C.transpose() * C;
           g[n] += C.transpose() * row.error;
@@ -302,7 +304,10 @@ class CameraChecker {
               Q.transpose() * C;
         }
       }
-      for (const auto& [n, G] : of_track) D[n] -= G.transpose() * G;
+      for (const auto& [n, G] : of_track) {
+        D[n] -= G.transpose() * G;
+        g[n] -= G.transpose() * G_e;
+      }
     }
     if (lengths.empty()) return false;
     length_ = LowerMedian(std::move(lengths));

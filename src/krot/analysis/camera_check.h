@@ -12,10 +12,12 @@
 
 namespace krot::internal {
 
-// An observation at the least squares of its track.
+// An observation at the least squares of its track. The error and its
+// derivatives are divided by its relative sigma.
 struct PoseRow {
   uint64_t element = 0;  // in Model::track_elements
   int32_t image = 0;
+  double relative_sigma = 1;
   Eigen::Vector3d x_cam;
   Eigen::Vector2d error;  // projected - measured, pixels
   // By the camera's rotation (from the left) and centre. The derivative by the
@@ -63,7 +65,7 @@ struct SharedGroup {
   double square = 0;
 };
 
-// The derivatives of an observation by the columns of a group. No camera model
+// The derivatives of a PoseRow's error by the columns of a group. No camera model
 // has more parameters.
 struct ByGroup {
   int32_t group;

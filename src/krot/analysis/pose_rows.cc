@@ -90,8 +90,9 @@ std::vector<PoseRow> PoseRows::Of(size_t k) const {
     if (!projected) continue;
     row.element = e;
     row.image = n;
-    row.error = noise_.observations[e].error_px;
-    const Matrix23& by_cam = projected->by_cam;
+    row.relative_sigma = noise_.observations[e].relative_sigma;
+    row.error = noise_.observations[e].error_px / row.relative_sigma;
+    const Matrix23 by_cam = projected->by_cam / row.relative_sigma;
     row.F << -by_cam * CrossMatrix(row.x_cam), -by_cam * pose.rotation;
     if (row.F.allFinite()) rows.push_back(row);
   }
@@ -213,7 +214,9 @@ std::vector<ByGroup> SharedColumns::ByGroups(const PoseRow& row) const {
       param = value - step;
       const auto below = ProjectPoint(camera, row.x_cam);
       param = value;
-      if (above && below) by.C.col(i) = (*above - *below) / (2 * step);
+      if (above && below) {
+        by.C.col(i) = (*above - *below) / (2 * step * row.relative_sigma);
+      }
     }
   }
   const int32_t place = place_of_image_[row.image];

@@ -224,7 +224,8 @@ class TrackNoise::Track {
       noise = {};
       noise.error_px = rows_[n].error;
       if (!all_.relative_sigmas_.empty()) {
-        noise.error_px *= all_.relative_sigmas_[e];
+        noise.relative_sigma = all_.relative_sigmas_[e];
+        noise.error_px *= noise.relative_sigma;
       }
       double sum = 0;
       for (int j = 0; j < 2; ++j) {
