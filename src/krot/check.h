@@ -45,8 +45,7 @@ struct NoiseOptions {
   std::vector<double> relative_sigmas;
   // Observations to ignore, by track element. Empty: none.
   std::vector<char> is_left_out = {};
-  // Standard deviation of the noise per axis, pixels; > 0. None: it is
-  // estimated.
+  // Standard deviation of the noise per axis, pixels; > 0. None: estimated.
   std::optional<double> sigma_px = {};
 };
 
@@ -78,8 +77,7 @@ struct ModelNoise {
   // Standard deviation of the noise per axis, pixels, such that the median of
   // w^2 is that of chi^2. None if nothing is controlled.
   std::optional<double> sigma_px;
-  // How well the median determines sigma^2: the degrees of freedom of a chi^2
-  // with the same spread.
+  // Of a chi^2 that is spread as sigma^2 is, which the median determines.
   double degrees_of_freedom = 0;
   // The scale of a Cauchy loss for tails that are heavier than Gaussian: with
   // it the loss is the likelihood of a Student's t distribution with the 50 %
@@ -149,16 +147,14 @@ struct Conventions {
   // Takes the axes of the file's 2D points, which may count from another corner
   // or rows first, to COLMAP's.
   Eigen::Matrix2d pixel_from_file_axes = Eigen::Matrix2d::Identity();
-  // The 3D points are not where their images see them.
-  bool has_wrong_points = false;
+  bool has_wrong_points = false;  // 3D points: not where their images see them
   // Where cameras or 2D points are wrong, and poses and 3D points are right.
   std::vector<PixelMap> pixel_maps;
 
   // Median reprojection errors of a sample of the model's tracks, pixels: as it
-  // stands, and so converted, with points where their images see them. No error
-  // counts more than the size of the photo. If only the sensors of rigs are
-  // written otherwise, or some pixels mapped, these are the errors in their
-  // images.
+  // stands, and so converted, with points where their images see them; in the
+  // images of sensors or pixels, if only these differ. No error counts more
+  // than the size of the photo.
   double median_error_as_read_px = 0;
   double median_error_px = 0;
 
@@ -199,8 +195,7 @@ Model ConvertModel(const Model& model, const Conventions& from,
 
 enum class ImageVerdict {
   kFine,
-  kWeaklyHeld,  // its sound observations hold it ten times as weakly as the
-                // median image is held
+  kWeaklyHeld,  // by sound observations, ten times as weakly as the median one
   kWrong,
   kNotJudged,  // it has a pose, but no 2D points that could check it
 };
@@ -210,9 +205,7 @@ enum class ImageVerdict {
 enum class ImageFault {
   kNone,
   kMatches,  // the matches of its pairs contradict its pose (CheckPairs)
-  // The image has a camera of its own whose focal length stands out among
-  // cameras of the same kind, and noise does not explain so many of its errors.
-  kLens,
+  kLens,     // its own camera's focal length is odd; its errors are no noise
   kContradicted,  // noise does not explain most of its errors
   kMisplaced,     // another pose halves the sum of its squared errors
   kChance,        // its errors are those of chance matches
@@ -224,8 +217,7 @@ struct ImageCheck {
   std::string name;
   ImageVerdict verdict = ImageVerdict::kFine;
   ImageFault fault = ImageFault::kNone;
-  // kLens: the focal length of its own camera, and the median of the others';
-  // pixels.
+  // kLens: its own camera's focal length and the others' median, pixels.
   double focal_length_px = 0;
   double others_focal_length_px = 0;
   int64_t num_observations = 0;  // in tracks
@@ -288,13 +280,16 @@ enum class CameraFault {
   kPrincipalPoint,
   kDistortion,
   kPlaceInRig,
-  kImages,  // all of its images are wrong, three and more
+  kAspectRatio,  // its model has one focal length, and its images ask for two
+  kLens,         // its images ask for a distortion that its model does not have
+  kSharing,      // some of its images ask for another lens than the others
+  kImages,       // all of its images are wrong, three and more
 };
 
-// A camera that contradicts the observations of its images: another focal
-// length, principal point, distortion or place in its rig takes at least a
-// tenth of their squared errors away, with all poses and points free to move
-// along; or images of other cameras contradict all of its own.
+// A camera that contradicts its images: another focal length, principal point,
+// distortion or place in its rig takes at least a tenth of their squared errors
+// away, all poses and points moving along; or other cameras' images contradict
+// all of its own.
 struct WrongCamera {
   CameraId camera_id = 0;
   CameraFault fault = CameraFault::kFocalLength;
@@ -305,6 +300,8 @@ struct WrongCamera {
   // Their mean, as it is and as the images ask for, pixels.
   double focal_length_px = 0;
   double asked_focal_length_px = 0;
+  std::string model_name;                // kAspectRatio, kLens
+  std::vector<std::string> image_names;  // kSharing: those that ask for another
   // kPrincipalPoint: by how much it is off, pixels.
   double offset_px = 0;
   // kPlaceInRig: the turn and shift that the images ask for.
@@ -337,6 +334,11 @@ struct ModelCheck {
   std::optional<double> cauchy_scale_px;
   std::optional<double> median_scale_px;  // where keypoint scales are known
   double critical_w = 0;
+  // The share of the squared errors that is no noise: the correlation with the
+  // error of the nearest 2D point of another track, 10 px off or more, less
+  // three standard deviations. Up to 0.25 in real models that are sound, 0.42
+  // and more where photos had been cropped, stretched or zoomed.
+  double error_correlation = 0;
   // Whether most images stand where their own errors would put them, up to half
   // of an image's noise, and most points where these see them. If not, adjust
   // the model first; no image is called misplaced.
@@ -363,9 +365,11 @@ struct ModelCheck {
   std::vector<Eigen::Vector3d> points;
 
   int64_t NumImages(ImageVerdict verdict) const;
+  bool ErrorsAgree() const { return error_correlation > 0.4; }
   bool IsAnythingWrong() const {
-    return conventions || !fits || !observations.empty() || !cameras.empty() ||
-           !misplaced_points.empty() || NumImages(ImageVerdict::kWrong) > 0 ||
+    return conventions || !fits || ErrorsAgree() || !observations.empty() ||
+           !cameras.empty() || !misplaced_points.empty() ||
+           NumImages(ImageVerdict::kWrong) > 0 ||
            (pairs && pairs->IsAnythingWrong());
   }
 };
@@ -388,11 +392,10 @@ struct ModelCure {
 
 // A copy in COLMAP's conventions without wrong observations and images. An
 // image whose position alone is wrong by its matches is moved to where these
-// fit best (CheckedImage::moved_cam_from_world), unless it is wrong there as
-// well or others share its frame. All other cameras stay. Points that lose
-// observations move to the least squares of the rest; stored errors are
-// updated. A bitwise copy if nothing is wrong. `check` must come from
-// CheckModel with these options.
+// fit best (CheckedImage::moved_cam_from_world), unless it is wrong there too
+// or others share its frame. All other cameras stay. Points that lose some move
+// to the least squares of the rest; stored errors are updated. A bitwise copy
+// if nothing is wrong. `check` must come from CheckModel with these options.
 ModelCure CureModel(const Model& model, const ModelCheck& check,
                     const ModelCheckOptions& options = {},
                     const Context& context = {});

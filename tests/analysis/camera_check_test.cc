@@ -295,5 +295,113 @@ TEST(FindWrongCameras, WeighsObservationsByTheSizeOfTheirNoise) {
   ExpectGainOfSquares({0.5, 1, 2, 4, 0.7, 1.5, 3});
 }
 
+// A scene of one camera whose 2D points have been moved by `move`, from the
+// principal point.
+template <typename Move>
+Model MovedPixels(int model_id, const Move& move) {
+  SceneOptions options;
+  options.num_frames = 12;
+  options.num_points = 1500;
+  options.pixel_noise = 0.5;
+  options.camera_model_id = model_id;
+  Model model = SynthesizeScene(options).ground_truth;
+  const Camera& camera = model.cameras[0];
+  const Eigen::Vector2d middle(camera.params[model_id == 1 ? 2 : 1],
+                               camera.params[model_id == 1 ? 3 : 2]);
+  for (Image& image : model.images) {
+    for (Point2D& point : image.points2D) {
+      const Eigen::Vector2d moved =
+          middle + move(Eigen::Vector2d(point.x, point.y) - middle);
+      point.x = moved.x();
+      point.y = moved.y();
+    }
+  }
+  return model;
+}
+
+std::vector<WrongCamera> NarrowCameras(const Model& model, bool errors_agree) {
+  return FindNarrowCameras(model, EstimateNoise(model, {}, {}), errors_agree,
+                           0.05, 1);
+}
+
+TEST(FindNarrowCameras, FindsNoneWhereThereIsNothingButNoise) {
+  for (const int model_id : {0, 1, 2, 3}) {
+    const Model model =
+        MovedPixels(model_id, [](const Eigen::Vector2d& x) { return x; });
+    EXPECT_THAT(NarrowCameras(model, true), IsEmpty());
+  }
+}
+
+TEST(FindNarrowCameras, FindsADistortionThatTheModelDoesNotHave) {
+  const Model model = MovedPixels(1, [](const Eigen::Vector2d& x) {
+    return Eigen::Vector2d(x * (1 + 3e-8 * x.squaredNorm()));
+  });
+  const std::vector<WrongCamera> wrong = NarrowCameras(model, false);
+  ASSERT_THAT(wrong, SizeIs(1));
+  EXPECT_EQ(wrong[0].fault, CameraFault::kLens);
+  EXPECT_EQ(wrong[0].model_name, "PINHOLE");
+}
+
+TEST(FindNarrowCameras, FindsPhotosThatAreStretchedInOneDirection) {
+  const Model model = MovedPixels(0, [](const Eigen::Vector2d& x) {
+    return Eigen::Vector2d(1.02 * x.x(), 0.98 * x.y());
+  });
+  const std::vector<WrongCamera> wrong = NarrowCameras(model, false);
+  ASSERT_THAT(wrong, SizeIs(1));
+  EXPECT_EQ(wrong[0].fault, CameraFault::kAspectRatio);
+  EXPECT_EQ(wrong[0].model_name, "SIMPLE_PINHOLE");
+}
+
+// By comparing all pairs.
+double ErrorCorrelationOfAllPairs(const Model& model, const ModelNoise& noise) {
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
+  const std::vector<int32_t> point_of = PointsOfElements(model);
+  const auto pixel = [&](size_t e) {
+    const Point2D& point =
+        model.images[image_of[e]].points2D[model.track_elements[e].point2D_idx];
+    return Eigen::Vector2d(point.x, point.y);
+  };
+  double products = 0, squares = 0, num = 0;
+  for (size_t e = 0; e < image_of.size(); ++e) {
+    double least = 1e300;
+    size_t nearest = e;
+    for (size_t f = 0; f < image_of.size(); ++f) {
+      const double distance = (pixel(f) - pixel(e)).norm();
+      if (image_of[f] != image_of[e] || point_of[f] == point_of[e] ||
+          distance < 10 || distance >= least) {
+        continue;
+      }
+      least = distance;
+      nearest = f;
+    }
+    if (nearest == e) continue;
+    const Eigen::Vector2d &one = noise.observations[e].error_px,
+                          &other = noise.observations[nearest].error_px;
+    products += one.dot(other);
+    squares += (one.squaredNorm() + other.squaredNorm()) / 2;
+    ++num;
+  }
+  return products / squares - 3 / std::sqrt(num);
+}
+
+TEST(ErrorCorrelation, IsHighWhereErrorsDependOnThePlaceAndLowForNoise) {
+  const Model model =
+      MovedPixels(1, [](const Eigen::Vector2d& x) { return x; });
+  ModelNoise noise = EstimateNoise(model, {}, {});
+  EXPECT_LT(ErrorCorrelation(model, noise), 0.05);
+  EXPECT_NEAR(ErrorCorrelation(model, noise),
+              ErrorCorrelationOfAllPairs(model, noise), 1e-12);
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
+  for (size_t e = 0; e < noise.observations.size(); ++e) {
+    const Point2D& pixel =
+        model.images[image_of[e]].points2D[model.track_elements[e].point2D_idx];
+    noise.observations[e].error_px +=
+        Eigen::Vector2d(std::sin(pixel.x / 100), std::cos(pixel.y / 100));
+  }
+  EXPECT_GT(ErrorCorrelation(model, noise), 0.4);
+  EXPECT_NEAR(ErrorCorrelation(model, noise),
+              ErrorCorrelationOfAllPairs(model, noise), 1e-12);
+}
+
 }  // namespace
 }  // namespace krot::internal

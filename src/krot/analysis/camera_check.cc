@@ -8,9 +8,8 @@
 #include <Eigen/Core>
 
 #include "krot/base/numbers.h"
-#include "krot/geometry/transform.h"
+#include "krot/camera/camera_model.h"
 #include "krot/linear/blocks.h"
-#include "krot/linear/reduced_camera_system.h"
 
 namespace krot::internal {
 namespace {
@@ -30,187 +29,18 @@ using Matrix26 = Eigen::Matrix<double, 2, 6>;
 constexpr double kLeastGain = 0.1;
 constexpr double kLeastGainOfOneImage = 0.2;
 
-// What the columns of cameras gain, the points and the poses eliminated: D =
-// C'C and g = C'e.
-struct GainSystem {
-  explicit GainSystem(Index size)
-      : D(MatrixXd::Zero(size, size)), g(VectorXd::Zero(size)) {}
-
-  VectorXd StepOf(const SharedGroup& group) const {
-    return DeterminedStep<VectorXd>(
-        D.block(group.begin, group.begin, group.size, group.size),
-        g.segment(group.begin, group.size));
-  }
-  double GainOf(const SharedGroup& group) const {
-    return group.size == 0 || g.size() == 0
-               ? 0
-               : -g.segment(group.begin, group.size).dot(StepOf(group));
-  }
-
-  // Frees the group's columns: what is left is the gain beside it.
-  void Free(const SharedGroup& group) {
-    if (group.size == 0) return;
-    const MatrixXd rows = D.middleRows(group.begin, group.size);
-    const MatrixXd own = rows.middleCols(group.begin, group.size);
-    MatrixXd steps(group.size, g.size());
-    for (Index c = 0; c < g.size(); ++c) {
-      steps.col(c) = DeterminedStep<VectorXd>(own, rows.col(c));
-    }
-    g += rows.transpose() *
-         DeterminedStep<VectorXd>(own, g.segment(group.begin, group.size));
-    D += rows.transpose() * steps;
-  }
-
-  MatrixXd D;
-  VectorXd g;
-};
-
-// Eliminates the points and then the poses of frames from the normal equations
-// with the columns of cameras.
-class PoseElimination {
- public:
-  // Keeps references. `length` is the unit in which centres move.
-  PoseElimination(const Model& model, const PoseRows& rows,
-                  const SharedColumns& shared, double length)
-      : model_(model),
-        rows_(rows),
-        shared_(shared),
-        length_(length),
-        num_columns_(shared.num_columns()),
-        of_cameras_(num_columns_) {}
-
-  // Without columns if the poses cannot be eliminated.
-  GainSystem Run(int num_threads) {
-    BlockStructure structure;
-    structure.point_begin = {0};
-    std::vector<std::vector<PoseRow>> tracks;
-    for (size_t k = 0; k < model_.points3D.size(); ++k) {
-      std::vector<PoseRow> rows = rows_.Of(k);
-      if (rows.empty()) continue;
-      for (const PoseRow& row : rows) {
-        const int32_t frame = FrameOf(row);
-        structure.frame_of.push_back(2 * frame);
-        structure.frame_of.push_back(2 * frame + 1);
-      }
-      structure.point_begin.push_back(
-          static_cast<int64_t>(structure.frame_of.size()));
-      tracks.push_back(std::move(rows));
-    }
-    structure.frame_is_fixed.assign(2 * model_.frames.size(), 1);
-    for (const int32_t f : structure.frame_of) structure.frame_is_fixed[f] = 0;
-    ReducedCameraSystem system(structure);
-    system.SetZero();
-    T_ = MatrixXd::Zero(system.num_columns(), num_columns_ + 1);
-    for (const std::vector<PoseRow>& rows : tracks) AddTrack(rows, &system);
-    if (!system.Factorize(num_threads)) return GainSystem(0);
-    MatrixXd X(T_.rows(), T_.cols());
-    for (Index c = 0; c < T_.cols(); ++c) {
-      X.col(c) = system.Solve(T_.col(c), 1e-8);
-    }
-    const auto T = T_.leftCols(num_columns_);
-    of_cameras_.D -= T.transpose() * X.leftCols(num_columns_);
-    of_cameras_.g -= T.transpose() * X.col(num_columns_);
-    of_cameras_.D = (of_cameras_.D + of_cameras_.D.transpose()).eval() / 2;
-    return std::move(of_cameras_);
-  }
-
- private:
-  // The centre in units of length.
-  Matrix26 ByFrame(const PoseRow& row) const {
-    Matrix26 F = rows_.ByFrame(row);
-    F.rightCols<3>() *= length_;
-    return F;
-  }
-
-  int32_t FrameOf(const PoseRow& row) const {
-    return rows_.geometries()[row.image].frame;
-  }
-
-  void AddTrack(const std::vector<PoseRow>& rows, ReducedCameraSystem* system) {
-    const std::vector<SharedGroup>& groups = shared_.groups();
-    MatrixXd& D = of_cameras_.D;
-    VectorXd& g = of_cameras_.g;
-    const Matrix3d root = PoseRows::RootOf(rows);
-    std::vector<int32_t> nodes;
-    for (const PoseRow& row : rows) {
-      nodes.push_back(2 * FrameOf(row));
-      nodes.push_back(2 * FrameOf(row) + 1);
-    }
-    SortUnique(&nodes);
-    // Rows of G are contiguous.
-    Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> G(
-        3, 3 * static_cast<Index>(nodes.size()));
-    G.setZero();
-    std::map<int32_t, MatrixXd> G_of;
-    Vector3d G_e = Vector3d::Zero();
-    for (const PoseRow& row : rows) {
-      const int32_t node = 2 * FrameOf(row);
-      const Matrix23 Q = row.F.rightCols<3>() * root;
-      const Matrix26 F = ByFrame(row);
-      const Index slot =
-          3 *
-          (std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin());
-      G.middleCols<6>(slot) += Q.transpose() * F;
-      G_e += Q.transpose() * row.error;
-      for (const auto& [a, b] : {std::pair(0, 0), {1, 0}, {1, 1}}) {
-        const Matrix3d block = F.middleCols<3>(Index{3} * a).transpose() *
-                               F.middleCols<3>(Index{3} * b);
-        system->AddBlock(0, node + a, node + b, block.data());
-      }
-      const Index column = system->column(node);
-      T_.block<6, 1>(column, num_columns_) += F.transpose() * row.error;
-      const std::vector<ByGroup> all = shared_.ByGroups(row);
-      for (const auto& [n, C] : all) {
-        const SharedGroup& group = groups[n];
-        T_.block(column, group.begin, 6, group.size) += F.transpose() * C;
-        g.segment(group.begin, group.size) += C.transpose() * row.error;
-        G_of.try_emplace(n, MatrixXd::Zero(3, group.size)).first->second +=
-            Q.transpose() * C;
-        for (const auto& [m, other] : all) {
-          D.block(group.begin, groups[m].begin, group.size, groups[m].size) +=
-              C.transpose() * other;
-        }
-      }
-    }
-    const double* const rows_of_G[3] = {G.row(0).data(), G.row(1).data(),
-                                        G.row(2).data()};
-    system->SubtractSquare(0, nodes, std::vector<char>(nodes.size(), 0),
-                           rows_of_G);
-    for (size_t a = 0; a < nodes.size(); ++a) {
-      const Eigen::Matrix3d G_a = G.middleCols<3>(static_cast<Index>(3 * a));
-      const Index column = system->column(nodes[a]);
-      T_.block<3, 1>(column, num_columns_) -= G_a.transpose() * G_e;
-      for (const auto& [n, G_n] : G_of) {
-        T_.block(column, groups[n].begin, 3, groups[n].size) -=
-            G_a.transpose() * G_n;
-      }
-    }
-    for (const auto& [n, G_n] : G_of) {
-      g.segment(groups[n].begin, groups[n].size) -= G_n.transpose() * G_e;
-      for (const auto& [m, G_m] : G_of) {
-        D.block(groups[n].begin, groups[m].begin, groups[n].size,
-                groups[m].size) -= G_n.transpose() * G_m;
-      }
-    }
-  }
-
-  const Model& model_;
-  const PoseRows& rows_;
-  const SharedColumns& shared_;
-  const double length_;
-  const Index num_columns_;
-  MatrixXd T_;  // F'C and F'e, its last column
-  GainSystem of_cameras_;
-};
+// Cameras of their own for more images would take gigabytes.
+constexpr size_t kMostOwnCameras = 500;
 
 class CameraChecker {
  public:
-  CameraChecker(const Model& model, const ModelNoise& noise,
+  CameraChecker(const Model& model, const ModelNoise& noise, Lenses lenses,
                 int least_num_images, double false_alarm, int num_threads)
       : model_(model),
         noise_(noise),
+        lenses_(std::move(lenses)),
         rows_(model, noise),
-        shared_(model, rows_.geometries(), AddUpImages(model, noise)),
+        shared_(lenses_, rows_.geometries(), AddUpImages(model, noise)),
         least_num_images_(least_num_images),
         num_threads_(num_threads) {
     least_exponent_ =
@@ -220,7 +50,7 @@ class CameraChecker {
   std::vector<WrongCamera> Run() {
     if (!DropUnsuspected()) return {};
     GainSystem system =
-        PoseElimination(model_, rows_, shared_, length_).Run(num_threads_);
+        EliminatePoses(model_, rows_, shared_, length_, num_threads_);
     std::vector<WrongCamera> wrong;
     std::vector<char> is_free(Groups().size(), 0);
     for (;;) {
@@ -264,9 +94,8 @@ class CameraChecker {
   bool IsPossible(const VectorXd& step, const SharedGroup& group) const {
     if (group.fault != CameraFault::kFocalLength) return true;
     for (Index i = 0; i < group.size; ++i) {
-      if (model_.cameras[group.camera].params[group.params[i]] + step[i] <= 0) {
-        return false;
-      }
+      const Camera& lens = lenses_.cameras[group.camera];
+      if (lens.params[group.params[i]] + step[i] <= 0) return false;
     }
     return true;
   }
@@ -314,7 +143,8 @@ class CameraChecker {
     std::vector<char> is_suspected;
     for (size_t n = 0; n < Groups().size(); ++n) {
       const double gain = -g[n].dot(DeterminedStep(D[n], g[n]));
-      is_suspected.push_back(ExponentOf(gain, Groups()[n]) > least_exponent_);
+      is_suspected.push_back(Groups()[n].num_images >= least_num_images_ &&
+                             ExponentOf(gain, Groups()[n]) > least_exponent_);
     }
     shared_.Keep(is_suspected);
     return shared_.num_columns() > 0;
@@ -322,12 +152,17 @@ class CameraChecker {
 
   WrongCamera Describe(const SharedGroup& group, double gain,
                        const VectorXd& step) const {
-    const Camera& camera = model_.cameras[group.camera];
+    const Camera& camera = lenses_.cameras[group.camera];
     WrongCamera wrong;
     wrong.camera_id = camera.id;
     wrong.fault = group.fault;
     wrong.gain = std::min(1.0, gain / group.square);
     wrong.num_images = group.num_images;
+    for (size_t n = 0; n < model_.images.size() && group.num_images == 1; ++n) {
+      if (lenses_.of_image[n] == group.camera) {
+        wrong.image_names = {model_.images[n].name};
+      }
+    }
     switch (group.fault) {
       case CameraFault::kFocalLength:
         for (Index i = 0; i < group.size; ++i) {
@@ -341,6 +176,9 @@ class CameraChecker {
         wrong.offset_px = step.norm();
         break;
       case CameraFault::kDistortion:
+      case CameraFault::kAspectRatio:
+      case CameraFault::kLens:
+      case CameraFault::kSharing:
       case CameraFault::kImages:
         break;
       case CameraFault::kPlaceInRig:
@@ -353,6 +191,7 @@ class CameraChecker {
 
   const Model& model_;
   const ModelNoise& noise_;
+  const Lenses lenses_;
   const PoseRows rows_;
   SharedColumns shared_;
   const int least_num_images_;
@@ -361,14 +200,95 @@ class CameraChecker {
   double length_ = 1;  // the median distance of a point from a camera
 };
 
+Lenses LensesOf(const Model& model) {
+  Lenses lenses;
+  lenses.cameras = model.cameras;
+  for (const ImageGeometry& geometry : ImageGeometries(model)) {
+    lenses.of_image.push_back(geometry.camera);
+  }
+  return lenses;
+}
+
+// The same camera in the model OPENCV (fx, fy, cx, cy, k1, k2, p1, p2), if that
+// has all that its own has.
+Camera InOpenCv(Camera camera) {
+  const std::string_view name = FindCameraModel(camera.model_id)->name;
+  const bool has_one =
+      name == "SIMPLE_RADIAL" || name == "RADIAL" || name == "SIMPLE_PINHOLE";
+  if (!has_one && name != "PINHOLE") return camera;
+  if (has_one) camera.params.insert(camera.params.begin(), camera.params[0]);
+  camera.params.resize(8, 0);
+  camera.model_id = FindCameraModel("OPENCV")->id;
+  return camera;
+}
+
+// Every image with a camera of its own, under its camera's id.
+Lenses Unshared(const Lenses& shared) {
+  Lenses own;
+  own.can_move_in_rigs = shared.can_move_in_rigs;
+  for (const int32_t c : shared.of_image) {
+    own.of_image.push_back(static_cast<int32_t>(own.cameras.size()));
+    own.cameras.push_back(shared.cameras[c]);
+  }
+  return own;
+}
+
 }  // namespace
 
 std::vector<WrongCamera> FindWrongCameras(const Model& model,
                                           const ModelNoise& noise,
                                           int least_num_images,
                                           double false_alarm, int num_threads) {
-  return CameraChecker(model, noise, least_num_images, false_alarm, num_threads)
+  return CameraChecker(model, noise, LensesOf(model), least_num_images,
+                       false_alarm, num_threads)
       .Run();
+}
+
+std::vector<WrongCamera> FindNarrowCameras(const Model& model,
+                                           const ModelNoise& noise,
+                                           bool errors_agree,
+                                           double false_alarm,
+                                           int num_threads) {
+  Lenses rich = LensesOf(model);
+  rich.can_move_in_rigs = false;
+  std::map<CameraId, int64_t> num_images;
+  std::map<CameraId, std::string> model_names;
+  for (const int32_t c : rich.of_image) ++num_images[rich.cameras[c].id];
+  for (Camera& camera : rich.cameras) {
+    model_names[camera.id] = FindCameraModel(camera.model_id)->name;
+    camera = InOpenCv(std::move(camera));
+  }
+  std::vector<WrongCamera> wrong =
+      CameraChecker(model, noise, rich, 2, false_alarm, num_threads).Run();
+  for (WrongCamera& camera : wrong) {
+    camera.model_name = model_names[camera.camera_id];
+    if (camera.fault == CameraFault::kFocalLength &&
+        FindCameraModel(camera.model_name)->num_focal_lengths() == 1) {
+      camera.fault = CameraFault::kAspectRatio;
+    } else if (camera.fault == CameraFault::kDistortion) {
+      camera.fault = CameraFault::kLens;
+    }
+  }
+  if (!wrong.empty() || !errors_agree ||
+      model.images.size() > kMostOwnCameras) {
+    return wrong;
+  }
+  for (const WrongCamera& of_image :
+       CameraChecker(model, noise, Unshared(rich), 1, false_alarm, num_threads)
+           .Run()) {
+    const int64_t num = num_images[of_image.camera_id];
+    if (num == 1) continue;
+    const auto same = std::find_if(
+        wrong.begin(), wrong.end(), [&](const WrongCamera& camera) {
+          return camera.camera_id == of_image.camera_id;
+        });
+    WrongCamera& camera = same == wrong.end() ? wrong.emplace_back() : *same;
+    camera.camera_id = of_image.camera_id;
+    camera.fault = CameraFault::kSharing;
+    camera.num_images = num;
+    camera.image_names.push_back(of_image.image_names.front());
+  }
+  return wrong;
 }
 
 void AddCamerasOfWrongImages(const Model& model, ModelCheck* check) {

@@ -7,6 +7,7 @@
 
 #include "krot/analysis/noise.h"
 #include "krot/check.h"
+#include "krot/linear/blocks.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 
@@ -50,10 +51,17 @@ class PoseRows {
   std::vector<double> nearest_;  // distance of a point, by image; scene units
 };
 
+// The cameras of images: a model's, or others that project the same.
+struct Lenses {
+  std::vector<Camera> cameras;
+  std::vector<int32_t> of_image;  // in `cameras`, as Model::images
+  bool can_move_in_rigs = true;
+};
+
 // What images share of a camera, and may be wrong with it: columns of the
 // derivatives that are freed together.
 struct SharedGroup {
-  int32_t camera = 0;  // index in Model::cameras
+  int32_t camera = 0;  // index in Lenses::cameras
   int32_t rig = -1;    // index in Model::rigs, of kPlaceInRig
   CameraFault fault = CameraFault::kFocalLength;
   std::vector<int> params;  // indices in Camera::params
@@ -65,20 +73,20 @@ struct SharedGroup {
   double square = 0;
 };
 
-// The derivatives of a PoseRow's error by the columns of a group. No camera model
-// has more parameters.
+// The derivatives of a PoseRow's error by the columns of a group. No camera
+// model has more parameters.
 struct ByGroup {
   int32_t group;
   Eigen::Matrix<double, 2, Eigen::Dynamic, 0, 2, 16> C;
 };
 
-// The focal length, principal point and distortion of every camera with an
-// image plane, and the place of every camera in its rig but for the reference
+// The focal length, principal point and distortion of every lens with an image
+// plane, and the place of every camera in its rig but for the reference
 // sensor's.
 class SharedColumns {
  public:
   // Keeps references. `sums` are AddUpImages of the model.
-  SharedColumns(const Model& model,
+  SharedColumns(const Lenses& lenses,
                 const std::vector<ImageGeometry>& geometries,
                 const std::vector<PoseSums>& sums);
 
@@ -98,13 +106,55 @@ class SharedColumns {
   void AddPlaces();
   void Number();
 
-  const Model& model_;
+  const Lenses& lenses_;
   const std::vector<ImageGeometry>& geometries_;
   std::vector<SharedGroup> groups_;
   std::vector<std::vector<int32_t>> groups_of_camera_;
   std::vector<int32_t> place_of_image_;  // -1: a reference sensor
   Eigen::Index num_columns_ = 0;
 };
+
+// What the columns of cameras gain, the points and the poses eliminated: D and
+// g, below.
+struct GainSystem {
+  explicit GainSystem(Eigen::Index size)
+      : D(Eigen::MatrixXd::Zero(size, size)), g(Eigen::VectorXd::Zero(size)) {}
+
+  Eigen::VectorXd StepOf(const SharedGroup& group) const {
+    return DeterminedStep<Eigen::VectorXd>(
+        D.block(group.begin, group.begin, group.size, group.size),
+        g.segment(group.begin, group.size));
+  }
+  double GainOf(const SharedGroup& group) const {
+    return group.size == 0 || g.size() == 0
+               ? 0
+               : -g.segment(group.begin, group.size).dot(StepOf(group));
+  }
+
+  // Frees the group's columns: what is left is the gain beside it.
+  void Free(const SharedGroup& group) {
+    if (group.size == 0) return;
+    const Eigen::MatrixXd rows = D.middleRows(group.begin, group.size);
+    const Eigen::MatrixXd own = rows.middleCols(group.begin, group.size);
+    Eigen::MatrixXd steps(group.size, g.size());
+    for (Eigen::Index c = 0; c < g.size(); ++c) {
+      steps.col(c) = DeterminedStep<Eigen::VectorXd>(own, rows.col(c));
+    }
+    g += rows.transpose() * DeterminedStep<Eigen::VectorXd>(
+                                own, g.segment(group.begin, group.size));
+    D += rows.transpose() * steps;
+  }
+
+  Eigen::MatrixXd D;
+  Eigen::VectorXd g;
+};
+
+// Eliminates the points and then the poses of frames from the normal equations
+// with the columns of cameras. `length` is the unit in which centres move.
+// Without columns if the poses cannot be eliminated.
+GainSystem EliminatePoses(const Model& model, const PoseRows& rows,
+                          const SharedColumns& shared, double length,
+                          int num_threads);
 
 // Finds cameras whose focal length, principal point, distortion or place in
 // the rig is wrong: freeing it lowers the sum of squared errors of the camera's
@@ -126,6 +176,17 @@ std::vector<WrongCamera> FindWrongCameras(const Model& model,
                                           const ModelNoise& noise,
                                           int least_num_images,
                                           double false_alarm, int num_threads);
+
+// Where FindWrongCameras finds none: cameras of several images, in the models
+// SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL and RADIAL, whose images ask for what
+// only OPENCV has, as above (kAspectRatio, kLens). If there are none, and
+// `errors_agree`, cameras of some of whose images the same is true if every
+// image has a camera of its own (kSharing); not asked above 500 images. The
+// cost is that of a step of bundle adjustment.
+std::vector<WrongCamera> FindNarrowCameras(const Model& model,
+                                           const ModelNoise& noise,
+                                           bool errors_agree,
+                                           double false_alarm, int num_threads);
 
 // Adds to check->cameras those of which all images, at least three, are wrong:
 // that is no chance. Requires the images' verdicts. O(images).

@@ -151,6 +151,12 @@ class Checker {
     check_.cameras =
         FindWrongCameras(model_, snooping_.noise, check_.is_adjusted ? 1 : 2,
                          options_.false_alarm, context_.num_threads);
+    check_.error_correlation = ErrorCorrelation(model_, snooping_.noise);
+    if (check_.is_adjusted && check_.cameras.empty()) {
+      check_.cameras =
+          FindNarrowCameras(model_, snooping_.noise, check_.ErrorsAgree(),
+                            options_.false_alarm, context_.num_threads);
+    }
     check_.is_adjusted = check_.is_adjusted && check_.cameras.empty();
   }
 

@@ -229,6 +229,10 @@ class ErrorsInDisc {
 std::vector<ErrorsInDisc> FillDiscs(const Model& model,
                                     const std::vector<double>& errors_px);
 
+// ModelCheck::error_correlation of the observations that `noise` tests.
+// O(n^1.5) for the n observations of an image.
+double ErrorCorrelation(const Model& model, const ModelNoise& noise);
+
 // The exponent of Chernoff's bound exp(-exponent) on the probability that so
 // many trials or more succeed, each with probability p; 0 if as many are to be
 // expected.

@@ -6,24 +6,23 @@
 #include <string_view>
 #include <utility>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-
 #include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/geometry/transform.h"
 #include "krot/linear/blocks.h"
+#include "krot/linear/reduced_camera_system.h"
 
 namespace krot::internal {
 namespace {
 
 using Eigen::Index;
 using Eigen::Matrix3d;
+using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+using Eigen::VectorXd;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 using Matrix26 = Eigen::Matrix<double, 2, 6>;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 // Of a difference quotient, relative to parameters above 1: its square and the
 // rounding of pixels over it are both far below a pixel.
@@ -119,10 +118,10 @@ Matrix26 PoseRows::ByFrame(const PoseRow& row) const {
   return F;
 }
 
-SharedColumns::SharedColumns(const Model& model,
+SharedColumns::SharedColumns(const Lenses& lenses,
                              const std::vector<ImageGeometry>& geometries,
                              const std::vector<PoseSums>& sums)
-    : model_(model), geometries_(geometries) {
+    : lenses_(lenses), geometries_(geometries) {
   AddLenses();
   AddPlaces();
   Number();
@@ -133,7 +132,7 @@ SharedColumns::SharedColumns(const Model& model,
       groups_[g].num_directions += sums[n].num_directions;
       groups_[g].square += sums[n].square;
     };
-    for (const int32_t g : groups_of_camera_[geometries[n].camera]) add(g);
+    for (const int32_t g : groups_of_camera_[lenses_.of_image[n]]) add(g);
     if (place_of_image_[n] >= 0) add(place_of_image_[n]);
   }
 }
@@ -146,9 +145,9 @@ void SharedColumns::Keep(const std::vector<char>& is_kept) {
 }
 
 void SharedColumns::AddLenses() {
-  groups_of_camera_.resize(model_.cameras.size());
-  for (size_t c = 0; c < model_.cameras.size(); ++c) {
-    const Camera& camera = model_.cameras[c];
+  groups_of_camera_.resize(lenses_.cameras.size());
+  for (size_t c = 0; c < lenses_.cameras.size(); ++c) {
+    const Camera& camera = lenses_.cameras[c];
     if (!FindCameraModel(camera.model_id)->has_image_plane) continue;
     const std::vector<std::string_view> names = ParamNames(camera);
     for (const CameraFault fault :
@@ -174,7 +173,10 @@ void SharedColumns::AddPlaces() {
   std::map<std::pair<int32_t, int32_t>, int32_t> group_of;
   for (const ImageGeometry& geometry : geometries_) {
     place_of_image_.push_back(-1);
-    if (!geometry.has_pose || geometry.sensor < 0) continue;
+    if (!geometry.has_pose || geometry.sensor < 0 ||
+        !lenses_.can_move_in_rigs) {
+      continue;
+    }
     const auto [entry, is_new] = group_of.try_emplace(
         {geometry.rig, geometry.sensor}, static_cast<int32_t>(groups_.size()));
     place_of_image_.back() = entry->second;
@@ -198,8 +200,9 @@ void SharedColumns::Number() {
 std::vector<ByGroup> SharedColumns::ByGroups(const PoseRow& row) const {
   const ImageGeometry& geometry = geometries_[row.image];
   std::vector<ByGroup> all;
-  Camera camera = model_.cameras[geometry.camera];
-  for (const int32_t n : groups_of_camera_[geometry.camera]) {
+  const int32_t lens = lenses_.of_image[row.image];
+  Camera camera = lenses_.cameras[lens];
+  for (const int32_t n : groups_of_camera_[lens]) {
     const SharedGroup& group = groups_[n];
     if (group.size == 0) continue;
     ByGroup& by = all.emplace_back();
@@ -232,120 +235,150 @@ std::vector<ByGroup> SharedColumns::ByGroups(const PoseRow& row) const {
 
 namespace {
 
-// Of a track, `error` and its derivatives `F` by the pose and `A` by the point;
-// root G with G G' = (A'A)^-1 over the whole track.
-template <int N>
-void Add(const Eigen::Matrix<double, N, 6>& F,
-         const Eigen::Matrix<double, N, 3>& A,
-         const Eigen::Matrix<double, N, 1>& error, const Matrix3d& root,
-         PoseSums* sums) {
-  using Square = Eigen::Matrix<double, N, N>;
-  const Eigen::Matrix<double, N, 3> B = A * root;
-  const Square R =
-      Square::Identity(B.rows(), B.rows()) - Square(B * B.transpose());
-  const auto [values, vectors] = [&R] {
-    if constexpr (N == 2) {
-      Eigen::SelfAdjointEigenSolver<Square> of_R;
-      of_R.computeDirect(R);
-      return std::pair(of_R.eigenvalues(), of_R.eigenvectors());
-    } else {
-      return EigenpairsOf(R);
+// Eliminates the points and then the poses of frames from the normal equations
+// with the columns of cameras.
+class PoseElimination {
+ public:
+  // Keeps references. `length` is the unit in which centres move.
+  PoseElimination(const Model& model, const PoseRows& rows,
+                  const SharedColumns& shared, double length)
+      : model_(model),
+        rows_(rows),
+        shared_(shared),
+        length_(length),
+        num_columns_(shared.num_columns()),
+        of_cameras_(num_columns_) {}
+
+  // Without columns if the poses cannot be eliminated.
+  GainSystem Run(int num_threads) {
+    BlockStructure structure;
+    structure.point_begin = {0};
+    std::vector<std::vector<PoseRow>> tracks;
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      std::vector<PoseRow> rows = rows_.Of(k);
+      if (rows.empty()) continue;
+      for (const PoseRow& row : rows) {
+        const int32_t frame = FrameOf(row);
+        structure.frame_of.push_back(2 * frame);
+        structure.frame_of.push_back(2 * frame + 1);
+      }
+      structure.point_begin.push_back(
+          static_cast<int64_t>(structure.frame_of.size()));
+      tracks.push_back(std::move(rows));
     }
-  }();
-  for (Index j = 0; j < R.rows(); ++j) {
-    const double r = values[j];
-    if (r < kControlled) continue;
-    const Eigen::Matrix<double, N, 1> direction = vectors.col(j);
-    const Vector6 f = F.transpose() * direction;
-    const double along = direction.dot(error);
-    sums->M.noalias() += r * f * f.transpose();
-    sums->g.noalias() += along * f;
-    sums->square += along * along / r;
-    ++sums->num_directions;
+    structure.frame_is_fixed.assign(2 * model_.frames.size(), 1);
+    for (const int32_t f : structure.frame_of) structure.frame_is_fixed[f] = 0;
+    ReducedCameraSystem system(structure);
+    system.SetZero();
+    T_ = MatrixXd::Zero(system.num_columns(), num_columns_ + 1);
+    for (const std::vector<PoseRow>& rows : tracks) AddTrack(rows, &system);
+    if (!system.Factorize(num_threads)) return GainSystem(0);
+    MatrixXd X(T_.rows(), T_.cols());
+    for (Index c = 0; c < T_.cols(); ++c) {
+      X.col(c) = system.Solve(T_.col(c), 1e-8);
+    }
+    const auto T = T_.leftCols(num_columns_);
+    of_cameras_.D -= T.transpose() * X.leftCols(num_columns_);
+    of_cameras_.g -= T.transpose() * X.col(num_columns_);
+    of_cameras_.D = (of_cameras_.D + of_cameras_.D.transpose()).eval() / 2;
+    return std::move(of_cameras_);
   }
-}
 
-void FindSteps(std::vector<PoseSums>* sums) {
-  for (PoseSums& one : *sums) one.step = DeterminedStep(one.M, one.g);
-}
+ private:
+  // The centre in units of length.
+  Matrix26 ByFrame(const PoseRow& row) const {
+    Matrix26 F = rows_.ByFrame(row);
+    F.rightCols<3>() *= length_;
+    return F;
+  }
 
-// 1 / sqrt of the smallest eigenvalue of A - B C^-1 B'; infinite if nothing
-// holds.
-double LargestSpread(const Matrix3d& A, const Matrix3d& B, const Matrix3d& C) {
-  const Matrix3d S = A - B * C.ldlt().solve(B.transpose());
-  if (!S.allFinite()) return kInfinity;
-  const Vector3d values =
-      Eigen::SelfAdjointEigenSolver<Matrix3d>(S, Eigen::EigenvaluesOnly)
-          .eigenvalues();
-  const bool is_held = values[0] > kNoDirection * A.trace();
-  return is_held ? 1 / std::sqrt(values[0]) : kInfinity;
-}
+  int32_t FrameOf(const PoseRow& row) const {
+    return rows_.geometries()[row.image].frame;
+  }
+
+  void AddTrack(const std::vector<PoseRow>& rows, ReducedCameraSystem* system) {
+    const std::vector<SharedGroup>& groups = shared_.groups();
+    MatrixXd& D = of_cameras_.D;
+    VectorXd& g = of_cameras_.g;
+    const Matrix3d root = PoseRows::RootOf(rows);
+    std::vector<int32_t> nodes;
+    for (const PoseRow& row : rows) {
+      nodes.push_back(2 * FrameOf(row));
+      nodes.push_back(2 * FrameOf(row) + 1);
+    }
+    SortUnique(&nodes);
+    // Rows of G are contiguous.
+    Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> G(
+        3, 3 * static_cast<Index>(nodes.size()));
+    G.setZero();
+    std::map<int32_t, MatrixXd> G_of;
+    Vector3d G_e = Vector3d::Zero();
+    for (const PoseRow& row : rows) {
+      const int32_t node = 2 * FrameOf(row);
+      const Matrix23 Q = row.F.rightCols<3>() * root;
+      const Matrix26 F = ByFrame(row);
+      const Index slot =
+          3 *
+          (std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin());
+      G.middleCols<6>(slot) += Q.transpose() * F;
+      G_e += Q.transpose() * row.error;
+      for (const auto& [a, b] : {std::pair(0, 0), {1, 0}, {1, 1}}) {
+        const Matrix3d block = F.middleCols<3>(Index{3} * a).transpose() *
+                               F.middleCols<3>(Index{3} * b);
+        system->AddBlock(0, node + a, node + b, block.data());
+      }
+      const Index column = system->column(node);
+      T_.block<6, 1>(column, num_columns_) += F.transpose() * row.error;
+      const std::vector<ByGroup> all = shared_.ByGroups(row);
+      for (const auto& [n, C] : all) {
+        const SharedGroup& group = groups[n];
+        T_.block(column, group.begin, 6, group.size) += F.transpose() * C;
+        g.segment(group.begin, group.size) += C.transpose() * row.error;
+        G_of.try_emplace(n, MatrixXd::Zero(3, group.size)).first->second +=
+            Q.transpose() * C;
+        for (const auto& [m, other] : all) {
+          D.block(group.begin, groups[m].begin, group.size, groups[m].size) +=
+              C.transpose() * other;
+        }
+      }
+    }
+    const double* const rows_of_G[3] = {G.row(0).data(), G.row(1).data(),
+                                        G.row(2).data()};
+    system->SubtractSquare(0, nodes, std::vector<char>(nodes.size(), 0),
+                           rows_of_G);
+    for (size_t a = 0; a < nodes.size(); ++a) {
+      const Eigen::Matrix3d G_a = G.middleCols<3>(static_cast<Index>(3 * a));
+      const Index column = system->column(nodes[a]);
+      T_.block<3, 1>(column, num_columns_) -= G_a.transpose() * G_e;
+      for (const auto& [n, G_n] : G_of) {
+        T_.block(column, groups[n].begin, 3, groups[n].size) -=
+            G_a.transpose() * G_n;
+      }
+    }
+    for (const auto& [n, G_n] : G_of) {
+      g.segment(groups[n].begin, groups[n].size) -= G_n.transpose() * G_e;
+      for (const auto& [m, G_m] : G_of) {
+        D.block(groups[n].begin, groups[m].begin, groups[n].size,
+                groups[m].size) -= G_n.transpose() * G_m;
+      }
+    }
+  }
+
+  const Model& model_;
+  const PoseRows& rows_;
+  const SharedColumns& shared_;
+  const double length_;
+  const Index num_columns_;
+  MatrixXd T_;  // F'C and F'e, its last column
+  GainSystem of_cameras_;
+};
 
 }  // namespace
 
-double PoseSums::CenterSpread() const {
-  return LargestSpread(M.bottomRightCorner<3, 3>(), M.bottomLeftCorner<3, 3>(),
-                       M.topLeftCorner<3, 3>());
-}
-
-double PoseSums::TurnSpread() const {
-  return LargestSpread(M.topLeftCorner<3, 3>(), M.topRightCorner<3, 3>(),
-                       M.bottomRightCorner<3, 3>());
-}
-
-double PoseSums::GainExponent(double sigma_px) const {
-  return internal::GainExponent(Gain(), square, num_directions, 6, sigma_px);
-}
-
-std::vector<PoseSums> AddUpImages(const Model& model, const ModelNoise& noise) {
-  const PoseRows all(model, noise);
-  std::vector<PoseSums> sums(model.images.size());
-  for (size_t k = 0; k < model.points3D.size(); ++k) {
-    const std::vector<PoseRow> rows = all.Of(k);
-    const Matrix3d root = PoseRows::RootOf(rows);
-    for (const PoseRow& row : rows) {
-      Add<2>(row.F, row.F.rightCols<3>(), row.error, root, &sums[row.image]);
-    }
-  }
-  FindSteps(&sums);
-  return sums;
-}
-
-std::vector<PoseSums> AddUpFrames(const Model& model, const ModelNoise& noise) {
-  const bool has_rigs =
-      std::any_of(model.frames.begin(), model.frames.end(),
-                  [](const Frame& frame) { return frame.data.size() > 1; });
-  if (!has_rigs) return AddUpImages(model, noise);
-  const PoseRows all(model, noise);
-  std::vector<PoseSums> sums(model.frames.size());
-  for (size_t k = 0; k < model.points3D.size(); ++k) {
-    const std::vector<PoseRow> rows = all.Of(k);
-    const Matrix3d root = PoseRows::RootOf(rows);
-    std::map<int32_t, std::vector<const PoseRow*>> of_frames;
-    for (const PoseRow& row : rows) {
-      of_frames[all.geometries()[row.image].frame].push_back(&row);
-    }
-    for (const auto& [frame, of_frame] : of_frames) {
-      const auto size = static_cast<Index>(2 * of_frame.size());
-      Eigen::Matrix<double, Eigen::Dynamic, 6> F(size, 6);
-      Eigen::Matrix<double, Eigen::Dynamic, 3> A(size, 3);
-      Eigen::VectorXd error(size);
-      for (Index i = 0; i < size; i += 2) {
-        const PoseRow& row = *of_frame[i / 2];
-        F.middleRows<2>(i) = all.ByFrame(row);
-        A.middleRows<2>(i) = row.F.rightCols<3>();
-        error.segment<2>(i) = row.error;
-      }
-      Add<Eigen::Dynamic>(F, A, error, root, &sums[frame]);
-    }
-  }
-  FindSteps(&sums);
-  std::vector<PoseSums> of_images(model.images.size());
-  for (size_t n = 0; n < of_images.size(); ++n) {
-    const ImageGeometry& geometry = all.geometries()[n];
-    if (geometry.has_pose) of_images[n] = sums[geometry.frame];
-  }
-  return of_images;
+GainSystem EliminatePoses(const Model& model, const PoseRows& rows,
+                          const SharedColumns& shared, double length,
+                          int num_threads) {
+  return PoseElimination(model, rows, shared, length).Run(num_threads);
 }
 
 }  // namespace krot::internal

@@ -107,14 +107,17 @@ std::string NextSteps(const CheckReport& report) {
   std::string text = head;
   const bool is_converted = check.conventions.has_value();
   if (report.output_path.empty() &&
-      (is_converted ||
-       (check.is_adjusted && check.fits && check.IsAnythingWrong()))) {
+      (is_converted || (check.is_adjusted && check.fits &&
+                        !check.ErrorsAgree() && check.IsAnythingWrong()))) {
     text +=
         (is_converted ? "  The model put right, without what is wrong:\n"
                       : "  The model without what is wrong:\n") +
         ("    krot model_checker --input_path " + input) +
         (report.database_path.empty() ? "" : " --database_path " + database) +
         " --output_path " + cured + "\n";
+  }
+  if (NeedsOtherCameras(check) || check.ErrorsAgree()) {
+    return text + OtherCameraSteps(report);
   }
   if (!check.is_adjusted) {
     const auto off_center =
@@ -286,6 +289,14 @@ std::string ForAdjusted(const CheckReport& report) {
     add(Thousands(check.misplaced_points.size()) + " of " +
         Thousands(check.points.size()) +
         " 3D points lie far from where the images see them");
+  }
+  if (check.is_adjusted && check.ErrorsAgree()) {
+    add((text.empty() ? "Errors" : "errors") +
+        std::string(" of neighbouring 2D points agree, and ") +
+        FormatNumber(100 * check.error_correlation, 0) +
+        " % of the squared errors is no noise: photos that were cropped, "
+        "stretched or zoomed, a lens that no parameter describes, or what "
+        "moved bend the model");
   }
   if (check.pairs && !check.pairs->groups.empty()) {
     add((text.empty() ? "The" : "the") + std::string(" images fall into ") +

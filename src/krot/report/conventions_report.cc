@@ -1,5 +1,6 @@
 #include "krot/report/reports.h"
 
+#include <algorithm>
 #include <cctype>
 #include <string>
 #include <utility>
@@ -227,6 +228,163 @@ nlohmann::ordered_json ConventionsJson(const Conventions& one) {
                            has_central_principal_point, has_wrong_points,
                            median_error_as_read_px, median_error_px));
   return json;
+}
+
+namespace {
+
+const char* CameraFaultName(CameraFault fault) {
+  using Enum = CameraFault;
+  return NameIn<Enum>({{Enum::kFocalLength, "focal length"},
+                       {Enum::kPrincipalPoint, "principal point"},
+                       {Enum::kDistortion, "distortion"},
+                       {Enum::kPlaceInRig, "place in rig"},
+                       {Enum::kAspectRatio, "aspect ratio"},
+                       {Enum::kLens, "camera model"},
+                       {Enum::kSharing, "sharing"},
+                       {Enum::kImages, "images"}},
+                      fault);
+}
+
+// For example "its focal length is 1,106.2 px, and its 15 images ask for
+// 1,019.5 px".
+std::string CameraFaultWords(const WrongCamera& camera) {
+  const bool is_one = camera.num_images == 1;
+  const std::string ask =
+      "its " +
+      (is_one ? "image asks" : Counted(camera.num_images, "image") + " ask") +
+      " for ";
+  switch (camera.fault) {
+    case CameraFault::kFocalLength: {
+      // What is asked for is known to first order.
+      const double ratio =
+          camera.asked_focal_length_px / camera.focal_length_px;
+      const std::string asked =
+          ratio > 1.2   ? "a far longer one"
+          : ratio < 0.8 ? "a far shorter one"
+                        : "about " + Pixels(camera.asked_focal_length_px, 1);
+      const std::vector<double>& own = camera.focal_lengths_px;
+      if (own.size() == 2 && own[0] != own[1]) {
+        return "its focal lengths are " + FormatNumber(own[0], 1) + " and " +
+               Pixels(own[1], 1) + ", and " + ask +
+               (ratio > 1.2   ? "far longer ones"
+                : ratio < 0.8 ? "far shorter ones"
+                              : "others, " + asked + " in the mean");
+      }
+      return "its focal length is " + Pixels(camera.focal_length_px, 1) +
+             ", and " + ask + asked;
+    }
+    case CameraFault::kPrincipalPoint:
+      return ask + "another principal point, about " +
+             FormatNumber(camera.offset_px, 1) + " px away";
+    case CameraFault::kDistortion:
+      return ask + "another distortion";
+    case CameraFault::kPlaceInRig:
+      return ask + "another place in its rig, turned by about " +
+             FormatNumber(camera.turn_deg, 2) + " degrees and moved by about " +
+             FormatLength(camera.shift);
+    case CameraFault::kAspectRatio:
+      return ask + "an fx that is not fy, and " + camera.model_name +
+             " has one focal length";
+    case CameraFault::kLens:
+      return ask + "a distortion that " + camera.model_name + " does not have";
+    case CameraFault::kSharing: {
+      const size_t count = camera.image_names.size();
+      return Counted(count, "image") + " of its " +
+             Thousands(camera.num_images) + (count == 1 ? " asks" : " ask") +
+             " for another lens (" + ListText(camera.image_names, 5) +
+             "): they were zoomed, cropped or resized, or what they show moved";
+    }
+    case CameraFault::kImages:
+      return "all of its " + Counted(camera.num_images, "image") +
+             " are wrong, so its lens or its place in a rig may be";
+  }
+  return "";
+}
+
+}  // namespace
+
+bool NeedsOtherCameras(const ModelCheck& check) {
+  return std::any_of(check.cameras.begin(), check.cameras.end(),
+                     [](const WrongCamera& camera) {
+                       return camera.fault == CameraFault::kAspectRatio ||
+                              camera.fault == CameraFault::kLens ||
+                              camera.fault == CameraFault::kSharing;
+                     });
+}
+
+std::string OtherCameraSteps(const CheckReport& report) {
+  const std::vector<WrongCamera>& cameras = report.check.cameras;
+  const bool is_shared = std::any_of(
+      cameras.begin(), cameras.end(), [](const WrongCamera& camera) {
+        return camera.fault == CameraFault::kSharing;
+      });
+  if (is_shared || cameras.empty()) {
+    return "  Map anew with a camera for every image:\n    colmap "
+           "feature_extractor --ImageReader.single_camera_per_image 1 "
+           "--ImageReader.camera_model\n      OPENCV --database_path "
+           "NEW_DATABASE --image_path " +
+           (report.image_path.empty() ? "IMAGES" : report.image_path) + "\n";
+  }
+  const std::string input =
+      report.input_path.empty() ? "MODEL" : report.input_path;
+  return "  Give camera " + std::to_string(cameras.front().camera_id) +
+         " the model OPENCV: in AS_TEXT/cameras.txt its parameters become fx "
+         "fy cx cy k1\n  k2 p1 p2, 0 where nothing is known. Then adjust that "
+         "model:\n"
+         "    mkdir -p AS_TEXT\n    colmap model_converter --output_type TXT "
+         "--input_path " +
+         input +
+         " --output_path AS_TEXT\n    krot bundle_adjuster "
+         "--input_path AS_TEXT --output_path ADJUSTED\n";
+}
+
+std::string CamerasSentence(const ModelCheck& check) {
+  const WrongCamera& first = check.cameras.front();
+  const size_t count = check.cameras.size();
+  const std::string name = "camera " + std::to_string(first.camera_id);
+  return (count == 1 ? "C" + name.substr(1) + " is wrong: "
+                     : Counted(static_cast<int64_t>(count), "camera") +
+                           " are wrong, first of all " + name + ": ") +
+         CameraFaultWords(first) + ". " +
+         (NeedsOtherCameras(check)
+              ? "No adjustment mends that: see what comes next."
+              : "So adjust the model first, with all cameras free.");
+}
+
+std::string CameraTable(const ModelCheck& check, size_t max_rows) {
+  return TitledTable(
+      "Wrong cameras", {"camera", "images", "squared errors that go, %", "why"},
+      check.cameras, max_rows, [](const WrongCamera& camera) -> Row {
+        return {camera.camera_id, camera.num_images,
+                camera.fault == CameraFault::kImages
+                    ? ""
+                    : FormatNumber(100 * camera.gain, 0),
+                CameraFaultWords(camera)};
+      });
+}
+
+nlohmann::ordered_json CamerasJson(const ModelCheck& check) {
+  return ListJson(check.cameras, [](const WrongCamera& camera) {
+    const auto only = [&](CameraFault fault, const Json& values) {
+      return KnownIf(camera.fault == fault, values);
+    };
+    Json json = {
+        {"camera_id", camera.camera_id},
+        {"fault", CameraFaultName(camera.fault)},
+        {"reason", CameraFaultWords(camera)},
+        {"num_images", camera.num_images},
+        {"gain",
+         camera.fault == CameraFault::kImages ? Json() : Json(camera.gain)}};
+    json.update(
+        only(CameraFault::kFocalLength,
+             KROT_JSON_OF(camera, focal_length_px, asked_focal_length_px)));
+    json.update(
+        only(CameraFault::kPrincipalPoint, KROT_JSON_OF(camera, offset_px)));
+    json.update(only(CameraFault::kSharing, KROT_JSON_OF(camera, image_names)));
+    json.update(
+        only(CameraFault::kPlaceInRig, KROT_JSON_OF(camera, turn_deg, shift)));
+    return json;
+  });
 }
 
 }  // namespace krot::internal

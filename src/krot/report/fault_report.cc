@@ -27,60 +27,6 @@ std::string NameOfFirst(const ModelCheck& check, const ModelPart& part) {
 
 bool IsApart(const ModelPart& part) { return part.num_tracks == 0; }
 
-const char* CameraFaultName(CameraFault fault) {
-  using Enum = CameraFault;
-  return NameIn<Enum>({{Enum::kFocalLength, "focal length"},
-                       {Enum::kPrincipalPoint, "principal point"},
-                       {Enum::kDistortion, "distortion"},
-                       {Enum::kPlaceInRig, "place in rig"},
-                       {Enum::kImages, "images"}},
-                      fault);
-}
-
-// For example "its focal length is 1,106.2 px, and its 15 images ask for
-// 1,019.5 px".
-std::string CameraFaultWords(const WrongCamera& camera) {
-  const bool is_one = camera.num_images == 1;
-  const std::string ask =
-      "its " +
-      (is_one ? "image asks" : Counted(camera.num_images, "image") + " ask") +
-      " for ";
-  switch (camera.fault) {
-    case CameraFault::kFocalLength: {
-      // What is asked for is known to first order.
-      const double ratio =
-          camera.asked_focal_length_px / camera.focal_length_px;
-      const std::string asked =
-          ratio > 1.2   ? "a far longer one"
-          : ratio < 0.8 ? "a far shorter one"
-                        : "about " + Pixels(camera.asked_focal_length_px, 1);
-      const std::vector<double>& own = camera.focal_lengths_px;
-      if (own.size() == 2 && own[0] != own[1]) {
-        return "its focal lengths are " + FormatNumber(own[0], 1) + " and " +
-               Pixels(own[1], 1) + ", and " + ask +
-               (ratio > 1.2   ? "far longer ones"
-                : ratio < 0.8 ? "far shorter ones"
-                              : "others, " + asked + " in the mean");
-      }
-      return "its focal length is " + Pixels(camera.focal_length_px, 1) +
-             ", and " + ask + asked;
-    }
-    case CameraFault::kPrincipalPoint:
-      return ask + "another principal point, about " +
-             FormatNumber(camera.offset_px, 1) + " px away";
-    case CameraFault::kDistortion:
-      return ask + "another distortion";
-    case CameraFault::kPlaceInRig:
-      return ask + "another place in its rig, turned by about " +
-             FormatNumber(camera.turn_deg, 2) + " degrees and moved by about " +
-             FormatLength(camera.shift);
-    case CameraFault::kImages:
-      return "all of its " + Counted(camera.num_images, "image") +
-             " are wrong, so its lens or its place in a rig may be";
-  }
-  return "";
-}
-
 }  // namespace
 
 std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
@@ -197,29 +143,6 @@ nlohmann::ordered_json PartsJson(const ModelCheck& check) {
   });
 }
 
-std::string CamerasSentence(const ModelCheck& check) {
-  const WrongCamera& first = check.cameras.front();
-  const size_t count = check.cameras.size();
-  const std::string name = "camera " + std::to_string(first.camera_id);
-  return (count == 1 ? "C" + name.substr(1) + " is wrong: "
-                     : Counted(static_cast<int64_t>(count), "camera") +
-                           " are wrong, first of all " + name + ": ") +
-         CameraFaultWords(first) +
-         ". So adjust the model first, with all cameras free.";
-}
-
-std::string CameraTable(const ModelCheck& check, size_t max_rows) {
-  return TitledTable(
-      "Wrong cameras", {"camera", "images", "squared errors that go, %", "why"},
-      check.cameras, max_rows, [](const WrongCamera& camera) -> Row {
-        return {camera.camera_id, camera.num_images,
-                camera.fault == CameraFault::kImages
-                    ? ""
-                    : FormatNumber(100 * camera.gain, 0),
-                CameraFaultWords(camera)};
-      });
-}
-
 std::string ObservationTable(const ModelCheck& check, size_t max_rows) {
   return TitledTable(
       "Wrong observations, of images that are not wrong: w, the error over "
@@ -247,29 +170,6 @@ std::string TrackTable(const ModelCheck& check, size_t max_rows) {
                     FormatNumber(track.second.y(), 3) + " " +
                     FormatNumber(track.second.z(), 3)};
       });
-}
-
-nlohmann::ordered_json CamerasJson(const ModelCheck& check) {
-  return ListJson(check.cameras, [](const WrongCamera& camera) {
-    const auto only = [&](CameraFault fault, const Json& values) {
-      return KnownIf(camera.fault == fault, values);
-    };
-    Json json = {
-        {"camera_id", camera.camera_id},
-        {"fault", CameraFaultName(camera.fault)},
-        {"reason", CameraFaultWords(camera)},
-        {"num_images", camera.num_images},
-        {"gain",
-         camera.fault == CameraFault::kImages ? Json() : Json(camera.gain)}};
-    json.update(
-        only(CameraFault::kFocalLength,
-             KROT_JSON_OF(camera, focal_length_px, asked_focal_length_px)));
-    json.update(
-        only(CameraFault::kPrincipalPoint, KROT_JSON_OF(camera, offset_px)));
-    json.update(
-        only(CameraFault::kPlaceInRig, KROT_JSON_OF(camera, turn_deg, shift)));
-    return json;
-  });
 }
 
 std::string LastingFaultLines(const LastingFaults& faults) {
@@ -367,6 +267,7 @@ std::string CheckJson(const CheckReport& report) {
        BeforeAfterJson(report.pixel_error_before, report.pixel_error_after)},
       {"database", JsonIf(check.pairs, PairJson)},
       {"moved_images", report.moved},
+      {"error_correlation", check.error_correlation},
       {"cameras", CamerasJson(check)},
       {"discarded_cameras",
        ListJson(report.discarded,
