@@ -246,13 +246,12 @@ struct WrongObservation {
   uint32_t point2D_idx = 0;
   Point3DId point3D_id = 0;
   double w = 0;  // infinite: the point is in the camera, or not before it
-  // Distance from where the rest of its track puts the point; or NaN.
-  double error_px = 0;
-  // Of a track of two both are listed: nothing tells which is wrong.
-  bool is_of_two = false;
+  double error_px =
+      0;  // from where the rest of its track has the point; or NaN
+  bool is_of_two = false;  // both are listed: nothing tells which is wrong
 };
 
-// A track whose wrong observations agree on a second point.
+// Its wrong observations agree on a second point.
 struct TwoPointTrack {
   Point3DId point3D_id = 0;
   int64_t num_first = 0;   // observations that agree with the point
@@ -310,9 +309,8 @@ struct WrongCamera {
 };
 
 struct ModelCheckOptions {
-  // Must be read for this model (ReadDatabase). None: the model alone is
-  // judged. If it has keypoint scales, the noise of an observation is taken to
-  // grow with the square root of its keypoint's scale.
+  // Read for this model (ReadDatabase); none: the model alone is judged. With
+  // keypoint scales, noise is taken to grow with their square root.
   const Database* database = nullptr;
   // The probability that a model with Gaussian noise alone has a wrong
   // observation, and that a model in which some images are three times as noisy
@@ -334,10 +332,9 @@ struct ModelCheck {
   std::optional<double> cauchy_scale_px;
   std::optional<double> median_scale_px;  // where keypoint scales are known
   double critical_w = 0;
-  // The share of the squared errors that is no noise: the correlation with the
-  // error of the nearest 2D point of another track, 10 px off or more, less
-  // three standard deviations. Up to 0.25 in real models that are sound, 0.42
-  // and more where photos had been cropped, stretched or zoomed.
+  // The share of squared errors that is no noise: the correlation with that of
+  // the nearest 2D point of another track, 10 px off or more, less three
+  // standard deviations; up to 0.25 in sound real models, 0.42 in bent ones.
   double error_correlation = 0;
   // Whether most images stand where their own errors would put them, up to half
   // of an image's noise, and most points where these see them. If not, adjust
@@ -365,7 +362,7 @@ struct ModelCheck {
   std::vector<Eigen::Vector3d> points;
 
   int64_t NumImages(ImageVerdict verdict) const;
-  bool ErrorsAgree() const { return error_correlation > 0.4; }
+  bool ErrorsAgree() const { return is_adjusted && error_correlation > 0.4; }
   bool IsAnythingWrong() const {
     return conventions || !fits || ErrorsAgree() || !observations.empty() ||
            !cameras.empty() || !misplaced_points.empty() ||

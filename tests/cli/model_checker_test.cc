@@ -22,6 +22,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::StartsWith;
+using ::testing::UnorderedElementsAreArray;
 
 class ModelCheckerCommand : public ::testing::Test {
  protected:
@@ -347,6 +348,61 @@ TEST_F(WrongCameraCommand, IsToldByItsPrincipalPoint) {
   ExpectBlamedAndMended(
       model, "principal point",
       "its 10 images ask for another principal point, about ");
+}
+
+// The sample, whose points lie on surfaces, adjusted after its 2D points were
+// moved by `move`, from the principal point, in one image of `every`.
+class MovedPixelsCommand : public ModelCheckerCommand {
+ protected:
+  template <typename Move>
+  Json Checked(size_t every, const Move& move) {
+    Model model = Load(KROT_SAMPLE "/model");
+    const std::vector<double> params = model.cameras[0].params;
+    for (size_t n = 0; n < model.images.size(); n += every) {
+      moved_.push_back(model.images[n].name);
+      for (Point2D& point : model.images[n].points2D) {
+        move(point.x -= params[1], point.y -= params[2]);
+        point.x += params[1];
+        point.y += params[2];
+      }
+    }
+    Save(model, folder_ / "input");
+    Succeeded(RunKrot({"bundle_adjuster", "--input_path", folder_ / "input",
+                       "--output_path", folder_ / "adjusted"}));
+    result_ =
+        Succeeded(Check("adjusted", {"--report_path", folder_ / "r.json"}));
+    return ReadJson(folder_ / "r.json");
+  }
+
+  Words moved_;
+  KrotResult result_;
+};
+
+// No adjustment mends that: the steps make every photo its own camera.
+TEST_F(MovedPixelsCommand, OfZoomedPhotosAreNamed) {
+  const Json report = Checked(6, [](double& x, double& y) {
+    x *= 1.12;
+    y *= 1.12;
+  });
+  EXPECT_THAT(result_.out, StartsWith("Camera 1 is wrong: "));
+  EXPECT_THAT(result_.out, HasSubstr(" images of its 24 ask for another lens"));
+  EXPECT_THAT(result_.out,
+              HasSubstr("--ImageReader.single_camera_per_image 1"));
+  EXPECT_GT(report["error_correlation"], 0.4);
+  ASSERT_EQ(report["cameras"].size(), 1u);
+  EXPECT_EQ(report["cameras"][0]["fault"], "sharing");
+  // The surest come first.
+  Words named = report["cameras"][0]["image_names"];
+  ASSERT_GE(named.size(), moved_.size());
+  named.resize(moved_.size());
+  EXPECT_THAT(named, UnorderedElementsAreArray(moved_));
+}
+
+TEST_F(MovedPixelsCommand, OfStretchedPhotosAskForTwoFocalLengths) {
+  const Json report = Checked(1, [](double& x, double&) { x *= 1.1; });
+  EXPECT_THAT(result_.out, HasSubstr(" ask for an fx that is not fy, and "));
+  EXPECT_THAT(result_.out, HasSubstr(" the model OPENCV: "));
+  EXPECT_EQ(report["cameras"][0]["fault"], "aspect ratio");
 }
 
 TEST_F(WrongCameraCommand, IsToldByItsPlaceInTheRig) {

@@ -237,19 +237,14 @@ Lenses Unshared(const Lenses& shared) {
 
 std::vector<WrongCamera> FindWrongCameras(const Model& model,
                                           const ModelNoise& noise,
-                                          int least_num_images,
+                                          bool is_adjusted, bool errors_agree,
                                           double false_alarm, int num_threads) {
-  return CameraChecker(model, noise, LensesOf(model), least_num_images,
-                       false_alarm, num_threads)
-      .Run();
-}
-
-std::vector<WrongCamera> FindNarrowCameras(const Model& model,
-                                           const ModelNoise& noise,
-                                           bool errors_agree,
-                                           double false_alarm,
-                                           int num_threads) {
   Lenses rich = LensesOf(model);
+  std::vector<WrongCamera> wrong =
+      CameraChecker(model, noise, rich, is_adjusted ? 1 : 2, false_alarm,
+                    num_threads)
+          .Run();
+  if (!wrong.empty() || !is_adjusted) return wrong;
   rich.can_move_in_rigs = false;
   std::map<CameraId, int64_t> num_images;
   std::map<CameraId, std::string> model_names;
@@ -258,8 +253,7 @@ std::vector<WrongCamera> FindNarrowCameras(const Model& model,
     model_names[camera.id] = FindCameraModel(camera.model_id)->name;
     camera = InOpenCv(std::move(camera));
   }
-  std::vector<WrongCamera> wrong =
-      CameraChecker(model, noise, rich, 2, false_alarm, num_threads).Run();
+  wrong = CameraChecker(model, noise, rich, 2, false_alarm, num_threads).Run();
   for (WrongCamera& camera : wrong) {
     camera.model_name = model_names[camera.camera_id];
     if (camera.fault == CameraFault::kFocalLength &&

@@ -166,27 +166,21 @@ GainSystem EliminatePoses(const Model& model, const PoseRows& rows,
 //
 //   g' D^-1 g,  D = C'C - C'F (F'F)^-1 F'C,  g = C'e - C'F (F'F)^-1 F'e.
 //
-// Cameras of fewer images than `least_num_images` are not called wrong. What
-// lowers it most goes first, and then the gain of all others beside it is
-// found. Takes the observations that `noise` tests; noise.sigma_px must be
-// known. Where nothing gains as much with the poses held, as in a model that
-// was adjusted with all cameras free, the cost is O(observations), otherwise
-// that of a step of bundle adjustment. The same bits at any number of threads.
+// What lowers it most goes first, and then the gain of all others beside it is
+// found. In a model that is not adjusted cameras of one image are not judged.
+// In one that is, where no camera is wrong so, those of several images in the
+// models SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL and RADIAL are judged as OPENCV
+// (kAspectRatio, kLens). If none of these is wrong either, and `errors_agree`,
+// every image gets such a camera of its own (kSharing), of up to 500.
+//
+// Takes the observations that `noise` tests; noise.sigma_px must be known.
+// Where nothing gains as much with the poses held, as in a model that was
+// adjusted with all cameras free, the cost is O(observations), otherwise that
+// of a step of bundle adjustment. The same bits at any number of threads.
 std::vector<WrongCamera> FindWrongCameras(const Model& model,
                                           const ModelNoise& noise,
-                                          int least_num_images,
+                                          bool is_adjusted, bool errors_agree,
                                           double false_alarm, int num_threads);
-
-// Where FindWrongCameras finds none: cameras of several images, in the models
-// SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL and RADIAL, whose images ask for what
-// only OPENCV has, as above (kAspectRatio, kLens). If there are none, and
-// `errors_agree`, cameras of some of whose images the same is true if every
-// image has a camera of its own (kSharing); not asked above 500 images. The
-// cost is that of a step of bundle adjustment.
-std::vector<WrongCamera> FindNarrowCameras(const Model& model,
-                                           const ModelNoise& noise,
-                                           bool errors_agree,
-                                           double false_alarm, int num_threads);
 
 // Adds to check->cameras those of which all images, at least three, are wrong:
 // that is no chance. Requires the images' verdicts. O(images).

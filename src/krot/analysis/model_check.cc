@@ -44,8 +44,7 @@ class Checker {
   }
 
   ModelCheck Run() {
-    for (const Point3D& point : model_.points3D)
-      check_.points.push_back(point.xyz);
+    for (const Point3D& one : model_.points3D) check_.points.push_back(one.xyz);
     if (options_.database != nullptr) AskMatches();
     bool judges_cameras = true;
     for (;;) {
@@ -67,8 +66,8 @@ class Checker {
         noise_options_.sigma_px = snooping_.noise.sigma_px;
       if (!CallWrong(WorstImage()) && !CallUnsupported()) break;
     }
-    const int64_t num_wrong = check_.NumImages(ImageVerdict::kWrong);
-    if (num_wrong > 0 && !judges_cameras) JudgeCameras();
+    if (check_.NumImages(ImageVerdict::kWrong) > 0 && !judges_cameras)
+      JudgeCameras();
     AddCamerasOfWrongImages(model_, &check_);
     Describe();
     FindSecondPoints();
@@ -146,17 +145,12 @@ class Checker {
            MedianOfSound(gain) < 0.1;
   }
 
-  // A camera of one image is judged as an image is, in an adjusted model.
   void JudgeCameras() {
-    check_.cameras =
-        FindWrongCameras(model_, snooping_.noise, check_.is_adjusted ? 1 : 2,
-                         options_.false_alarm, context_.num_threads);
-    check_.error_correlation = ErrorCorrelation(model_, snooping_.noise);
-    if (check_.is_adjusted && check_.cameras.empty()) {
-      check_.cameras =
-          FindNarrowCameras(model_, snooping_.noise, check_.ErrorsAgree(),
-                            options_.false_alarm, context_.num_threads);
-    }
+    const ModelNoise& noise = snooping_.noise;
+    check_.error_correlation = ErrorCorrelation(model_, noise);
+    check_.cameras = FindWrongCameras(
+        model_, noise, check_.is_adjusted, check_.ErrorsAgree(),
+        options_.false_alarm, context_.num_threads);
     check_.is_adjusted = check_.is_adjusted && check_.cameras.empty();
   }
 

@@ -117,7 +117,7 @@ std::string NextSteps(const CheckReport& report) {
         " --output_path " + cured + "\n";
   }
   if (NeedsOtherCameras(check) || check.ErrorsAgree()) {
-    return text + OtherCameraSteps(report);
+    return text + OtherCameraSteps(check, input, images);
   }
   if (!check.is_adjusted) {
     const auto off_center =
@@ -290,7 +290,7 @@ std::string ForAdjusted(const CheckReport& report) {
         Thousands(check.points.size()) +
         " 3D points lie far from where the images see them");
   }
-  if (check.is_adjusted && check.ErrorsAgree()) {
+  if (check.ErrorsAgree()) {
     add((text.empty() ? "Errors" : "errors") +
         std::string(" of neighbouring 2D points agree, and ") +
         FormatNumber(100 * check.error_correlation, 0) +

@@ -312,22 +312,21 @@ bool NeedsOtherCameras(const ModelCheck& check) {
                      });
 }
 
-std::string OtherCameraSteps(const CheckReport& report) {
-  const std::vector<WrongCamera>& cameras = report.check.cameras;
-  const bool is_shared = std::any_of(
-      cameras.begin(), cameras.end(), [](const WrongCamera& camera) {
-        return camera.fault == CameraFault::kSharing;
-      });
-  if (is_shared || cameras.empty()) {
+std::string OtherCameraSteps(const ModelCheck& check, const std::string& input,
+                             const std::string& images) {
+  const bool is_shared =
+      std::any_of(check.cameras.begin(), check.cameras.end(),
+                  [](const WrongCamera& camera) {
+                    return camera.fault == CameraFault::kSharing;
+                  });
+  if (is_shared || check.cameras.empty()) {
     return "  Map anew with a camera for every image:\n    colmap "
            "feature_extractor --ImageReader.single_camera_per_image 1 "
            "--ImageReader.camera_model\n      OPENCV --database_path "
            "NEW_DATABASE --image_path " +
-           (report.image_path.empty() ? "IMAGES" : report.image_path) + "\n";
+           images + "\n";
   }
-  const std::string input =
-      report.input_path.empty() ? "MODEL" : report.input_path;
-  return "  Give camera " + std::to_string(cameras.front().camera_id) +
+  return "  Give camera " + std::to_string(check.cameras.front().camera_id) +
          " the model OPENCV: in AS_TEXT/cameras.txt its parameters become fx "
          "fy cx cy k1\n  k2 p1 p2, 0 where nothing is known. Then adjust that "
          "model:\n"

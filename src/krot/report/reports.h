@@ -150,12 +150,7 @@ std::string PartsSentence(const ModelCheck& check);
 std::string PartTable(const ModelCheck& check, size_t max_rows);
 // How the model's numbers are to be read.
 std::string ConventionsSentence(const Conventions& conventions);
-// Whether a camera is wrong in a way that no adjustment mends: its model or
-// what shares it. What then comes next, in commands of COLMAP and KROT.
-bool NeedsOtherCameras(const ModelCheck& check);
-std::string OtherCameraSteps(const CheckReport& report);
-// What is wrong with cameras that images share, and what to do; requires one at
-// least.
+// What is wrong with cameras, and what to do; requires one at least.
 std::string CamerasSentence(const ModelCheck& check);
 std::string CameraTable(const ModelCheck& check, size_t max_rows);
 // Wrong observations, and tracks that are two points.

@@ -55,6 +55,13 @@ std::string DiscardedSentence(const std::vector<DiscardedCamera>& discarded);
 std::string NotJudgedSentence(const ModelCheck& check);
 std::string SamePhotosSentence(const ModelCheck& check);
 
+// Whether a camera is wrong in a way that no adjustment mends: in its model, or
+// in what shares it. What then comes next, in commands of COLMAP and KROT, with
+// these paths.
+bool NeedsOtherCameras(const ModelCheck& check);
+std::string OtherCameraSteps(const ModelCheck& check, const std::string& input,
+                             const std::string& images);
+
 // Says that the largest error has risen, and why, where observations were left
 // out; "" if it has not.
 std::string RaisedMaxSentence(const PixelErrorStatistics& before,
