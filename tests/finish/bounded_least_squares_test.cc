@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <stdexcept>
 #include <vector>
 
@@ -185,6 +186,70 @@ TEST_P(BoundedLeastSquares, KeepsEveryIterateBelowTheCap) {
         MinimizeBounded(solved.scene.problem, options, {}, &estimate);
     EXPECT_EQ(summary.iterations, calls);
     EXPECT_LT(Cost(solved.scene.problem, estimate, norm(), 1), solved.cap);
+  }
+}
+
+// Moves every point along a direction of its own until its largest error is
+// just below the cap.
+Estimate WithPointsNearTheCap(const SolvedScene& solved, Norm norm,
+                              double share) {
+  const KnownRotationProblem& problem = solved.scene.problem;
+  Estimate estimate = solved.scene.estimate;
+  std::mt19937 generator(1);
+  std::normal_distribution<double> normal;
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    Eigen::Vector3d& point = estimate.points[k];
+    const Eigen::Vector3d from = point;
+    const Eigen::Vector3d direction(normal(generator), normal(generator),
+                                    normal(generator));
+    const auto is_below = [&](double length) {
+      point = from + length * direction;
+      for (const int64_t i : problem.OfPoint(k)) {
+        const ViewedPoint viewed =
+            ViewPoint(problem, problem.observations[i], estimate);
+        if (!(ResidualOf(viewed, norm) < share * solved.cap)) return false;
+      }
+      return true;
+    };
+    double low = 0, high = 1;
+    for (int n = 0; n < 50; ++n) {
+      const double middle = (low + high) / 2;
+      (is_below(middle) ? low : high) = middle;
+    }
+    point = from + low * direction;
+  }
+  return estimate;
+}
+
+TEST_P(BoundedLeastSquares, DoesNotDependOnWhereThePointsStartBelowTheCap) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    SolvedScene solved = Solve(seed, norm());
+    const BoundedOptions options = OptionsFor(solved, norm());
+    Estimate displaced = WithPointsNearTheCap(solved, norm(), 1 - 1e-6);
+    const BoundedSummary far =
+        MinimizeBounded(solved.scene.problem, options, {}, &displaced);
+    const BoundedSummary near = MinimizeBounded(solved.scene.problem, options,
+                                                {}, &solved.scene.estimate);
+    EXPECT_EQ(far.termination, InteriorPointTermination::kConverged);
+    EXPECT_LE(far.iterations, near.iterations + 1);
+    EXPECT_NEAR(far.cost_final, near.cost_final, 1e-3 * near.cost_final);
+  }
+}
+
+TEST_P(BoundedLeastSquares, LeavesFixedPointsInPlace) {
+  SolvedScene solved = Solve(6, norm());
+  KnownRotationProblem& problem = solved.scene.problem;
+  Estimate estimate = WithPointsNearTheCap(solved, norm(), 0.9);
+  const Estimate start = estimate;
+  problem.fixed_points.resize(problem.num_points);
+  for (int32_t k = 0; k < problem.num_points; k += 5) {
+    problem.fixed_points[k] = start.points[k];
+  }
+  MinimizeBounded(problem, OptionsFor(solved, norm()), {}, &estimate);
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    SCOPED_TRACE(k);
+    EXPECT_EQ(estimate.points[k] == start.points[k], k % 5 == 0);
   }
 }
 

@@ -5,7 +5,10 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/Cholesky>
+
 #include "krot/base/check.h"
+#include "krot/base/parallel_for.h"
 #include "krot/conic/cones.h"
 #include "krot/conic/path_following.h"
 #include "krot/finish/bounded_system.h"
@@ -13,6 +16,99 @@
 
 namespace krot::internal {
 namespace {
+
+// The part of the barrier cost, below, that depends on one point while all
+// cameras stay where they are.
+template <typename Cap>
+class PointBarrier {
+ public:
+  // Keeps references.
+  PointBarrier(const KnownRotationProblem& problem, const Cap& cap,
+               const BoundedOptions& options, int32_t num_views, double mu,
+               const std::vector<Eigen::Vector3d>& translations)
+      : problem_(problem),
+        cap_(cap),
+        options_(options),
+        num_views_(num_views),
+        mu_(mu),
+        cameras_(CamerasFromWorld(problem, translations)) {}
+
+  // Moves point k by Newton's steps until one promises to gain less than
+  // gap_tolerance of the value. Fixed points stay.
+  void Minimize(int32_t k, Eigen::Vector3d* point) const {
+    if (problem_.IsFixedPoint(k)) return;
+    double value = Value(k, *point);
+    for (int n = 0; n < options_.max_iterations; ++n) {
+      const Newton newton = NewtonStep(k, *point);
+      if (!(newton.gain > options_.gap_tolerance * value)) return;
+      Eigen::Vector3d moved;
+      const auto is_lower = [&](double length) {
+        moved = *point + length * newton.step;
+        const double value_there = Value(k, moved);
+        if (!(value_there < value)) return false;
+        value = value_there;
+        return true;
+      };
+      if (Backtrack(1, is_lower) == 0) return;
+      *point = moved;
+    }
+  }
+
+ private:
+  struct Newton {
+    Eigen::Vector3d step;
+    double gain;  // promised by the quadratic model
+  };
+
+  // Infinite unless the point is in front of its cameras and below the cap.
+  double Value(int32_t k, const Eigen::Vector3d& point) const {
+    double value = 0;
+    for (const int64_t i : problem_.OfPoint(k)) {
+      const Observation& o = problem_.observations[i];
+      const ViewedPoint viewed = ViewPoint(cameras_[o.view], o, point);
+      if (!(viewed.depth > 0)) return kInfinity;
+      const Eigen::Vector2d e = viewed.v / viewed.depth;
+      const typename Cap::Vector h = cap_.Slacks(e);
+      if (!(h.minCoeff() > 0)) return kInfinity;
+      const double rho = options_.loss.Value(e.squaredNorm());
+      value += (o.view < num_views_ ? rho / 2 : 0) -
+               mu_ * std::log(cap_.RelativeSlack(h));
+    }
+    return value;
+  }
+
+  // Of the system of bounded_system.h with multipliers l_j = mu / h_j.
+  Newton NewtonStep(int32_t k, const Eigen::Vector3d& point) const {
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    for (const int64_t i : problem_.OfPoint(k)) {
+      const Observation& o = problem_.observations[i];
+      const AffineMap& A = cameras_[o.view];
+      const ViewedPoint viewed = ViewPoint(A, o, point);
+      const Eigen::Vector2d e = viewed.v / viewed.depth;
+      const Eigen::Matrix3d E = o.E * A.leftCols<3>() / viewed.depth;
+      const Eigen::Matrix<double, 2, 3> J = E.bottomRows<2>() - e * E.row(0);
+      const typename Cap::Vector inverse = cap_.Slacks(e).cwiseInverse();
+      const Eigen::Matrix<double, 2, Cap::kNum> N =
+          cap_.Normals(e) * inverse.asDiagonal();
+      const double weight =
+          o.view < num_views_ ? options_.loss.Weight(e.squaredNorm()) : 0;
+      const double own = weight + mu_ * Cap::kBend * inverse.sum();
+      H += J.transpose() * (own * J + mu_ * N * (N.transpose() * J)) +
+           mu_ * Cap::kNum * E.row(0).transpose() * E.row(0);
+      gradient += J.transpose() * (weight * e + mu_ * N.rowwise().sum());
+    }
+    const Eigen::Vector3d step = -H.ldlt().solve(gradient);
+    return {step, -gradient.dot(step) / 2};
+  }
+
+  const KnownRotationProblem& problem_;
+  const Cap& cap_;
+  const BoundedOptions& options_;
+  const int32_t num_views_;
+  const double mu_;
+  const std::vector<AffineMap> cameras_;
+};
 
 // One run along the central path: the minima of
 //
@@ -49,7 +145,10 @@ class BoundedPath {
       return summary_;
     }
     summary_.cost_initial = now_.cost;
-    StartMultipliers();
+    // It is large, as the start is near the boundary and has to leave it first.
+    const double first_mu = MuOf(/*relative_gap=*/10);
+    PlacePoints(first_mu);
+    StartMultipliers(first_mu);
     summary_.termination = FollowPath(context_, options_.max_iterations, this,
                                       &summary_.iterations);
     summary_.cost_final = now_.cost;
@@ -185,6 +284,23 @@ class BoundedPath {
   double BarrierCost(const State& state, double mu) const {
     return state.cost + mu * state.barrier;
   }
+  // The start may leave a point anywhere below the cap. Moves all points to the
+  // minima of their own parts, or as far towards these as lenses allow.
+  void PlacePoints(double mu) {
+    const PointBarrier<Cap> barrier(problem_, system_.cap(), options_,
+                                    NumViews(), mu, now_.x.translations);
+    Estimate placed = now_.x;
+    ParallelForEach(problem_.num_points, context_.num_threads, [&](int64_t k) {
+      barrier.Minimize(static_cast<int32_t>(k), &placed.points[k]);
+    });
+    const auto try_share = [&](double share) {
+      trial_.x = Between(now_.x, placed, share);
+      return View(&trial_) && BarrierCost(trial_, mu) <= BarrierCost(now_, mu);
+    };
+    if (Backtrack(1, try_share) > 0) return std::swap(now_, trial_);
+    TakeRows(now_.x);
+  }
+
   double Count() const {  // of pairs
     return static_cast<double>(system_.loop().whole_count() * Cap::kNum);
   }
@@ -195,11 +311,9 @@ class BoundedPath {
     return now_.cost > 0 ? Count() * mu_ / now_.cost : 0;
   }
 
-  // mu / h. The first mu is large, as the start is near the boundary and has to
-  // leave it first. With multipliers of slacks h below a hundredth of the
-  // cap's, the slack could only double in a step.
-  void StartMultipliers() {
-    const double mu = MuOf(/*relative_gap=*/10);
+  // mu / h. With multipliers of slacks h below a hundredth of the cap's, the
+  // slack could only double in a step.
+  void StartMultipliers(double mu) {
     const Vector least = 0.01 * system_.cap().Slacks(Eigen::Vector2d::Zero());
     const double gap = system_.loop().Sum([&](int64_t i) {
       const Vector& h = now_.viewed[i].h;

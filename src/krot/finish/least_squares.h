@@ -65,7 +65,7 @@ struct BoundedOptions {
   std::optional<int32_t> num_views;
   ErrorLoss loss;
   double gap_tolerance = 1e-3;           // > 0, relative to the cost
-  double stationarity_tolerance = 1e-6;  // > 0
+  double stationarity_tolerance = 1e-5;  // > 0
   int max_iterations = 200;              // >= 1
   // Takes all rows of the problem itself anew, where their points project at an
   // estimate; false if one does not project. Empty if rows do not depend on the
