@@ -393,5 +393,18 @@ TEST(ErrorCorrelation, IsHighWhereErrorsDependOnThePlaceAndLowForNoise) {
               ErrorCorrelationOfAllPairs(model, noise), 1e-12);
 }
 
+// The rounding of stored numbers depends on the place, too.
+TEST(ErrorCorrelation, IsZeroWhereThereIsNoNoise) {
+  SceneOptions options;
+  options.num_frames = 8;
+  options.num_points = 300;
+  const Model model = SynthesizeScene(options).ground_truth;
+  ModelNoise noise = EstimateNoise(model, {}, {});
+  for (ObservationNoise& one : noise.observations) one.error_px.setOnes();
+  EXPECT_EQ(ErrorCorrelation(model, noise), 0);
+  noise.sigma_px = 1;
+  EXPECT_GT(ErrorCorrelation(model, noise), 0.8);
+}
+
 }  // namespace
 }  // namespace krot::internal

@@ -244,7 +244,9 @@ std::vector<WrongCamera> FindWrongCameras(const Model& model,
       CameraChecker(model, noise, rich, is_adjusted ? 1 : 2, false_alarm,
                     num_threads)
           .Run();
-  if (!wrong.empty() || !is_adjusted) return wrong;
+  if (!wrong.empty() || !is_adjusted || *noise.sigma_px < kLeastNoisePx) {
+    return wrong;
+  }
   rich.can_move_in_rigs = false;
   std::map<CameraId, int64_t> num_images;
   std::map<CameraId, std::string> model_names;

@@ -242,6 +242,7 @@ std::vector<PoseSums> AddUpFrames(const Model& model, const ModelNoise& noise) {
 }
 
 double ErrorCorrelation(const Model& model, const ModelNoise& noise) {
+  if (noise.sigma_px.value_or(0) < kLeastNoisePx) return 0;
   constexpr double kOtherPixels = 10;
   struct Observation {
     Vector2d pixel, error;

@@ -229,8 +229,8 @@ class ErrorsInDisc {
 std::vector<ErrorsInDisc> FillDiscs(const Model& model,
                                     const std::vector<double>& errors_px);
 
-// ModelCheck::error_correlation of the observations that `noise` tests.
-// O(n^1.5) for the n observations of an image.
+// ModelCheck::error_correlation of the observations that `noise` tests; 0 of
+// stored numbers' noise. O(n^1.5) for the n observations of an image.
 double ErrorCorrelation(const Model& model, const ModelNoise& noise);
 
 // The exponent of Chernoff's bound exp(-exponent) on the probability that so
