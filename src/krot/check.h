@@ -333,8 +333,8 @@ struct ModelCheck {
   std::optional<double> median_scale_px;  // where keypoint scales are known
   double critical_w = 0;
   // The share of squared errors that is no noise: the correlation with that of
-  // the nearest 2D point of another track, 10 px off or more, less three
-  // standard deviations; up to 0.25 in sound real models, 0.42 in bent ones.
+  // the nearest 2D point of another track, 10 px off or more, less three sigma.
+  // Up to 0.33 for sound cameras in real models, 0.42 for wrongly shared ones.
   double error_correlation = 0;
   // Whether most images stand where their own errors would put them, up to half
   // of an image's noise, and most points where these see them. If not, adjust

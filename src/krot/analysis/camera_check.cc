@@ -17,11 +17,9 @@ namespace {
 using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
-using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
-using Matrix26 = Eigen::Matrix<double, 2, 6>;
 
 // Of the squared errors of a camera's images. In real models that were adjusted
 // with their cameras free, it is 0.17 at most where a camera took one image
@@ -34,13 +32,16 @@ constexpr size_t kMostOwnCameras = 500;
 
 class CameraChecker {
  public:
-  CameraChecker(const Model& model, const ModelNoise& noise, Lenses lenses,
-                int least_num_images, double false_alarm, int num_threads)
+  // Keeps references.
+  CameraChecker(const Model& model, const ModelNoise& noise,
+                const PoseRows& rows, const std::vector<PoseSums>& sums,
+                const Lenses& lenses, int least_num_images, double false_alarm,
+                int num_threads)
       : model_(model),
         noise_(noise),
-        lenses_(std::move(lenses)),
-        rows_(model, noise),
-        shared_(lenses_, rows_.geometries(), AddUpImages(model, noise)),
+        lenses_(lenses),
+        rows_(rows),
+        shared_(lenses, rows.geometries(), sums),
         least_num_images_(least_num_images),
         num_threads_(num_threads) {
     least_exponent_ =
@@ -158,11 +159,6 @@ class CameraChecker {
     wrong.fault = group.fault;
     wrong.gain = std::min(1.0, gain / group.square);
     wrong.num_images = group.num_images;
-    for (size_t n = 0; n < model_.images.size() && group.num_images == 1; ++n) {
-      if (lenses_.of_image[n] == group.camera) {
-        wrong.image_names = {model_.images[n].name};
-      }
-    }
     switch (group.fault) {
       case CameraFault::kFocalLength:
         for (Index i = 0; i < group.size; ++i) {
@@ -191,8 +187,8 @@ class CameraChecker {
 
   const Model& model_;
   const ModelNoise& noise_;
-  const Lenses lenses_;
-  const PoseRows rows_;
+  const Lenses& lenses_;
+  const PoseRows& rows_;
   SharedColumns shared_;
   const int least_num_images_;
   const int num_threads_;
@@ -222,13 +218,15 @@ Camera InOpenCv(Camera camera) {
   return camera;
 }
 
-// Every image with a camera of its own, under its camera's id.
+// Every image with a camera of its own, whose id is the image's index.
 Lenses Unshared(const Lenses& shared) {
   Lenses own;
   own.can_move_in_rigs = shared.can_move_in_rigs;
   for (const int32_t c : shared.of_image) {
-    own.of_image.push_back(static_cast<int32_t>(own.cameras.size()));
+    const auto n = static_cast<int32_t>(own.cameras.size());
+    own.of_image.push_back(n);
     own.cameras.push_back(shared.cameras[c]);
+    own.cameras.back().id = static_cast<CameraId>(n);
   }
   return own;
 }
@@ -239,11 +237,15 @@ std::vector<WrongCamera> FindWrongCameras(const Model& model,
                                           const ModelNoise& noise,
                                           bool is_adjusted, bool errors_agree,
                                           double false_alarm, int num_threads) {
+  const PoseRows rows(model, noise);
+  const std::vector<PoseSums> sums = AddUpImages(model, noise);
+  const auto judge = [&](const Lenses& lenses, int least_num_images) {
+    return CameraChecker(model, noise, rows, sums, lenses, least_num_images,
+                         false_alarm, num_threads)
+        .Run();
+  };
   Lenses rich = LensesOf(model);
-  std::vector<WrongCamera> wrong =
-      CameraChecker(model, noise, rich, is_adjusted ? 1 : 2, false_alarm,
-                    num_threads)
-          .Run();
+  std::vector<WrongCamera> wrong = judge(rich, is_adjusted ? 1 : 2);
   if (!wrong.empty() || !is_adjusted || *noise.sigma_px < kLeastNoisePx) {
     return wrong;
   }
@@ -255,7 +257,7 @@ std::vector<WrongCamera> FindWrongCameras(const Model& model,
     model_names[camera.id] = FindCameraModel(camera.model_id)->name;
     camera = InOpenCv(std::move(camera));
   }
-  wrong = CameraChecker(model, noise, rich, 2, false_alarm, num_threads).Run();
+  wrong = judge(rich, 2);
   for (WrongCamera& camera : wrong) {
     camera.model_name = model_names[camera.camera_id];
     if (camera.fault == CameraFault::kFocalLength &&
@@ -269,20 +271,18 @@ std::vector<WrongCamera> FindWrongCameras(const Model& model,
       model.images.size() > kMostOwnCameras) {
     return wrong;
   }
-  for (const WrongCamera& of_image :
-       CameraChecker(model, noise, Unshared(rich), 1, false_alarm, num_threads)
-           .Run()) {
-    const int64_t num = num_images[of_image.camera_id];
-    if (num == 1) continue;
-    const auto same = std::find_if(
-        wrong.begin(), wrong.end(), [&](const WrongCamera& camera) {
-          return camera.camera_id == of_image.camera_id;
-        });
+  for (const WrongCamera& of_image : judge(Unshared(rich), 1)) {
+    const Image& image = model.images[of_image.camera_id];
+    if (num_images[image.camera_id] == 1) continue;
+    const auto same = std::find_if(wrong.begin(), wrong.end(),
+                                   [&](const WrongCamera& camera) {
+                                     return camera.camera_id == image.camera_id;
+                                   });
     WrongCamera& camera = same == wrong.end() ? wrong.emplace_back() : *same;
-    camera.camera_id = of_image.camera_id;
+    camera.camera_id = image.camera_id;
     camera.fault = CameraFault::kSharing;
-    camera.num_images = num;
-    camera.image_names.push_back(of_image.image_names.front());
+    camera.num_images = num_images[image.camera_id];
+    camera.image_names.push_back(image.name);
   }
   return wrong;
 }

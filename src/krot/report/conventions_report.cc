@@ -320,10 +320,11 @@ std::string OtherCameraSteps(const ModelCheck& check, const std::string& input,
                     return camera.fault == CameraFault::kSharing;
                   });
   if (is_shared || check.cameras.empty()) {
-    return "  Map anew with a camera for every image:\n    colmap "
-           "feature_extractor --ImageReader.single_camera_per_image 1 "
-           "--ImageReader.camera_model\n      OPENCV --database_path "
-           "NEW_DATABASE --image_path " +
+    return "  Give every image a camera of its own, in a new database; then "
+           "match and map anew:\n    colmap feature_extractor "
+           "--ImageReader.single_camera_per_image 1 "
+           "--ImageReader.camera_model OPENCV --database_path NEW_DATABASE "
+           "--image_path " +
            images + "\n";
   }
   return "  Give camera " + std::to_string(check.cameras.front().camera_id) +
