@@ -25,8 +25,7 @@ class Schedule : public KnownRotationSolver {
     const Timer timer;
     const Context context{num_threads_, cancel};
     SolveRows(problem, {/*model=*/{}, {}, method_, context, timer},
-              /*is_first_round=*/true, /*have_rows_served=*/{}, estimate,
-              &known, &summary);
+              /*have_rows_served=*/{}, estimate, &known, &summary);
     return !IsCancelled(cancel);
   }
 

@@ -156,7 +156,6 @@ class Rounds {
     is_bound_near_ = false;
     std::optional<Certificate> of_these = SolveRows(
         problem, {model_, rows_options_, method_, context_, timer_},
-        summary_.rounds.empty(),
         [this](const Estimate& swept, double linear_cost) {
           return HaveRowsServed(swept, linear_cost);
         },

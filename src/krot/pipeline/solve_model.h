@@ -284,10 +284,9 @@ struct SolveModelResult {
 // coordinates are rounded to the model's own.
 //
 // kAuto looks for a feasible start where the model's own start leaves out
-// observations (because they are behind their camera or have no pose), has all
-// centres in one place, or is still above init_max_error after the leading
-// sweeps. For a p without a joint solver and for the paper's settings, kAuto
-// means kResInt.
+// observations (because they are behind their camera or have no pose) or has
+// all centres in one place. For a p without a joint solver and for the paper's
+// settings, kAuto means kResInt.
 //
 // Requires a valid model (ValidateModel); throws ModelError for cameras without
 // an image plane and std::invalid_argument for options out of range. Memory:

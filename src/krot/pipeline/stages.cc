@@ -71,25 +71,6 @@ class Schedule {
     return result.certificate;
   }
 
-  // If the cost is above init_max_error: looks for a start from nothing, and
-  // takes it if it is better.
-  void StartAfresh() {
-    if (!(cost_ > options_.init_max_error)) return;
-    context_.Note("the start is a rough one; looking for a better");
-    FoundStart found = FindFeasibleStart(
-        problem_, options_, context_,
-        LogIterations(options_.joint.callback, timer_, &summary_));
-    if (found.termination == SolveTermination::kInterrupted) {
-      summary_.termination = SolveTermination::kInterrupted;
-    }
-    if (!found.estimate) return;
-    const double cost =
-        Cost(problem_, *found.estimate, options_.norm, context_.num_threads);
-    if (!(cost < cost_)) return;
-    estimate_ = *std::move(found.estimate);
-    cost_ = cost;
-  }
-
   double cost() const { return cost_; }
   bool IsZero() const { return IsZeroUpToRounding(cost_); }
   bool IsInterrupted() const {
@@ -117,7 +98,6 @@ class Schedule {
 
 std::optional<Certificate> SolveRows(
     const KnownRotationProblem& problem, const SolveRun& run,
-    bool is_first_round,
     const std::function<bool(const Estimate& swept, double linear_cost)>&
         have_rows_served,
     Estimate* estimate, KnownMultipliers* known, SolveSummary* summary) {
@@ -125,7 +105,7 @@ std::optional<Certificate> SolveRows(
   switch (run.method) {
     case SolveMethod::kResInt: {
       ResIntOptions res_int = run.options.res_int;
-      if (!is_first_round && res_int.update_frames) {
+      if (res_int.update_frames) {
         res_int.max_sweeps -= static_cast<int>(summary->sweeps.size());
       }
       schedule.Sweeps(res_int);
@@ -137,7 +117,6 @@ std::optional<Certificate> SolveRows(
       break;
   }
   schedule.LeadingSweeps();
-  if (is_first_round && !schedule.IsInterrupted()) schedule.StartAfresh();
   if (schedule.IsInterrupted()) return std::nullopt;
   if (schedule.IsZero()) {
     summary->termination = SolveTermination::kZeroCost;

@@ -126,14 +126,12 @@ std::optional<PixelCertificate> SolveInRounds(const SolveRun& run,
 // estimate of positive depths. Appends to the summary's sweeps and iterations,
 // with the seconds of run.timer, and sets its termination. Returns the
 // certificate of the joint solver, if it has one. The rows' cost rises by
-// rounding at most. Only the first round of kAuto looks for another start.
-// `have_rows_served` may be empty. kAuto calls it after its sweeps, with their
-// estimate and the rows' cost in pixels; if it returns true, because it is
-// better to take the rows anew, the joint solver is not run and the termination
-// is kStalled.
+// rounding at most. `have_rows_served` may be empty. kAuto calls it after its
+// sweeps, with their estimate and the rows' cost in pixels; if it returns true,
+// because it is better to take the rows anew, the joint solver is not run and
+// the termination is kStalled.
 std::optional<Certificate> SolveRows(
     const KnownRotationProblem& problem, const SolveRun& run,
-    bool is_first_round,
     const std::function<bool(const Estimate& swept, double linear_cost)>&
         have_rows_served,
     Estimate* estimate, KnownMultipliers* known, SolveSummary* summary);
