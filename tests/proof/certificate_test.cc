@@ -201,15 +201,12 @@ TEST(RepairMultipliers, EndsWithTheFirstThatAreSufficient) {
   const double delta =
       SuggestedBound(scene.problem, iterate.estimate, iterate.multipliers);
   const std::optional<Certificate> best =
-      RepairMultipliers(scene.problem, Norm::L2(), delta, iterate.multipliers)
-          .certificate;
+      RepairMultipliers(scene.problem, Norm::L2(), delta, iterate.multipliers);
   ASSERT_TRUE(best);
   RepairOptions options;
   options.sufficient_bound = 0.5 * best->lower_bound;
-  const std::optional<Certificate> first =
-      RepairMultipliers(scene.problem, Norm::L2(), delta, iterate.multipliers,
-                        options)
-          .certificate;
+  const std::optional<Certificate> first = RepairMultipliers(
+      scene.problem, Norm::L2(), delta, iterate.multipliers, options);
   ASSERT_TRUE(first);
   EXPECT_GE(first->lower_bound, options.sufficient_bound);
   EXPECT_LT(first->lower_bound, best->lower_bound);

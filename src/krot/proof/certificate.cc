@@ -44,8 +44,7 @@ bool IsBetter(const Certificate& a, const Certificate& b) {
 // tries several sets of multipliers:
 //
 //   Offer           repairs the given ones
-//   TryBalanced     repairs only those that are nearly stationary, without
-//                   misfits
+//   TryBalanced     repairs only those that are nearly stationary
 //   SolveAndReduce  those at the optimum of the observations' own problem; then
 //                   of the problem that sets its maximum, and so on
 //   TryAll          those of all observations, where too many set the maximum
@@ -80,9 +79,7 @@ class CertificateSearch {
 
   // Tries the multipliers of all observations, without points that frames can
   // spare (SelectForFrames). A smaller share makes a larger certificate; with a
-  // larger one, the rest may have to change too much. Misfits are not dropped:
-  // if there are some, the rest proves next to nothing, and more iterations are
-  // cheaper (docs/history/scale.md).
+  // larger one, the rest may have to change too much.
   void TryAll(const Estimate& estimate,
               const std::vector<Multiplier>& multipliers) {
     for (const double share : {1e-2, 0.0}) {
@@ -100,22 +97,16 @@ class CertificateSearch {
   // Tries those of the candidates' multipliers that are nearly stationary at
   // `delta`, pixels (SelectBalanced). A strict tolerance drops observations
   // that a proof may need; a lax one keeps some that are far from stationary.
-  // Misfits are dropped and the rest is tried again, at most twenty times, as
-  // each try costs a repair.
   void TryBalanced(double delta, const std::vector<Multiplier>& multipliers,
                    const std::vector<int64_t>& candidates) {
     for (const double tolerance : {1e-3, 1e-2, 3e-2, 1e-1, 3e-1}) {
-      std::vector<int64_t> left = candidates;
-      for (int drop = 0; drop < 20 && !left.empty() && !IsEnough(); ++drop) {
-        left = OfferComponents(
-            SelectBalanced(problem_, delta, multipliers, std::move(left),
-                           tolerance),
-            multipliers, options_.max_unknowns,
-            [&](const ProblemSubset&, const std::vector<Multiplier>&) {
-              return delta;
-            });
-      }
       if (IsEnough()) return;
+      OfferComponents(
+          SelectBalanced(problem_, delta, multipliers, candidates, tolerance),
+          multipliers, options_.max_unknowns,
+          [&](const ProblemSubset&, const std::vector<Multiplier>&) {
+            return delta;
+          });
     }
   }
 
@@ -172,59 +163,40 @@ class CertificateSearch {
     }
   }
 
-  // Offers each connected component that is not too large. Returns the
-  // observations of components that have misfits, without these, as they are
-  // worth another try.
-  std::vector<int64_t> OfferComponents(
-      const std::vector<int64_t>& observations,
-      const std::vector<Multiplier>& multipliers, int64_t max_unknowns,
-      const DeltaOf& delta_of) {
-    std::vector<int64_t> left;
+  // Offers each connected component that is not too large.
+  void OfferComponents(const std::vector<int64_t>& observations,
+                       const std::vector<Multiplier>& multipliers,
+                       int64_t max_unknowns, const DeltaOf& delta_of) {
     for (const std::vector<int64_t>& component :
          SplitIntoComponents(problem_, observations)) {
       const ProblemSubset part(problem_, component);
       if (NumUnknowns(part.problem()) > max_unknowns) continue;
       const std::vector<Multiplier> known = Pick(multipliers, component);
-      const std::vector<int64_t> misfits =
-          Offer(part, delta_of(part, known), known);
-      if (misfits.empty()) continue;
-      auto misfit = misfits.begin();
-      for (size_t n = 0; n < component.size(); ++n) {
-        if (misfit != misfits.end() && *misfit == static_cast<int64_t>(n)) {
-          ++misfit;
-        } else {
-          left.push_back(component[n]);
-        }
-      }
+      Offer(part, delta_of(part, known), known);
     }
-    std::sort(left.begin(), left.end());
-    return left;
   }
 
   // Repairs the part's multipliers, and keeps the result if it is the best so
-  // far and the check accepts it. Returns the misfits of the part.
-  std::vector<int64_t> Offer(const ProblemSubset& part, double delta,
-                             const std::vector<Multiplier>& multipliers) {
-    if (!(delta > 0)) return {};
+  // far and the check accepts it.
+  void Offer(const ProblemSubset& part, double delta,
+             const std::vector<Multiplier>& multipliers) {
+    if (!(delta > 0)) return;
     RepairOptions options;
     options.num_threads = context_.num_threads;
     if (NumUnknowns(part.problem()) > options_.max_unknowns) {
       options.sufficient_bound = (1 + kEqualBounds) * options_.sufficient_bound;
     }
-    RepairedMultipliers repaired =
+    std::optional<Certificate> repaired =
         RepairMultipliers(part.problem(), norm_, delta, multipliers, options);
-    if (!repaired.certificate || !IsBetter(*repaired.certificate, best_)) {
-      return repaired.misfits;
-    }
-    Certificate certificate = InWhole(part, std::move(*repaired.certificate));
+    if (!repaired || !IsBetter(*repaired, best_)) return;
+    Certificate certificate = InWhole(part, *std::move(repaired));
     certificate.defect = kMaxDefect;
     const CertificateCheck check =
         CheckCertificate(problem_, norm_, certificate);
-    if (!check.is_accepted) return {};
+    if (!check.is_accepted) return;
     // The arithmetic of another machine may find a slightly larger defect.
     certificate.defect = std::clamp(2 * check.defect, 1e-12, kMaxDefect);
     best_ = std::move(certificate);
-    return {};
   }
 
   const KnownRotationProblem& problem_;

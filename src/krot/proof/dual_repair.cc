@@ -163,11 +163,11 @@ DualFrame MakeDualFrame(const Vector2d& eta, Norm norm) {
 
 // Alternating projections, in the metric that Factorize fixes:
 //
-//   Factorize --> Balance --> Misfits --none--> Divided, kept if the best
-//                    ^           |                 |
-//                    |          any --> end      gains? --no--> end
-//                    |                             |
-//                    +---------- Shorten <--------yes
+//   Factorize --> Balance --> IsNear --yes--> Divided, kept if the best
+//                    ^           |                |
+//                    |          no --> end      gains? --no--> end
+//                    |                            |
+//                    +---------- Shorten <-------yes
 //
 // After Balance (1) and (2) hold, but perhaps not |y_i|_dual <= lambda_i; after
 // Shorten it is the other way round; after Divided both hold.
@@ -185,18 +185,13 @@ class Repair {
         now_(multipliers),
         sufficient_bound_(options.sufficient_bound) {}
 
-  RepairedMultipliers Run() {
-    RepairedMultipliers repaired;
-    if (!Factorize()) return repaired;
-    std::optional<Certificate>& best = repaired.certificate;
+  std::optional<Certificate> Run() {
+    if (!Factorize()) return std::nullopt;
+    std::optional<Certificate> best;
     // Each step costs two solves with the same factor.
     for (int step = 0; step < 20; ++step) {
       Balance();
-      const std::vector<int64_t> misfits = Misfits();
-      if (!misfits.empty()) {
-        if (!best) repaired.misfits = misfits;
-        break;
-      }
+      if (!IsNear()) break;
       const double ratio = LongestRatio() / (1 - 4e-13);  // for last roundings
       if (!(ratio > 0)) break;
       const double bound = delta_ / ratio;
@@ -206,7 +201,7 @@ class Repair {
       if (bound < before * (1 + 1e-9) && step > 1) break;
       Shorten();
     }
-    return repaired;
+    return best;
   }
 
  private:
@@ -238,14 +233,14 @@ class Repair {
     }
   }
 
-  std::vector<int64_t> Misfits() const {
-    std::vector<int64_t> misfits;
+  // Whether no lambda has changed by more than half.
+  bool IsNear() const {
     for (size_t i = 0; i < now_.size(); ++i) {
       if (!(std::abs(now_[i].lambda / original_[i].lambda - 1) < 0.5)) {
-        misfits.push_back(static_cast<int64_t>(i));
+        return false;
       }
     }
-    return misfits;
+    return true;
   }
 
   double LongestRatio() const {
@@ -286,10 +281,10 @@ class Repair {
 
 }  // namespace
 
-RepairedMultipliers RepairMultipliers(
+std::optional<Certificate> RepairMultipliers(
     const KnownRotationProblem& problem, Norm norm, double delta,
     const std::vector<Multiplier>& multipliers, const RepairOptions& options) {
-  if (multipliers.empty()) return {};
+  if (multipliers.empty()) return std::nullopt;
   return Repair(problem, norm, delta, multipliers, options).Run();
 }
 

@@ -161,16 +161,11 @@ struct RepairOptions {
 //
 // Requires one connected problem and one multiplier per observation, all
 // lambda > 0. See LeastNormSolver for the cost.
-struct RepairedMultipliers {
-  // With all observations of the problem. It is not verified; its defect is 0.
-  // None if the equations cannot be solved, or if there are misfits.
-  std::optional<Certificate> certificate;
-  // The observations whose lambda would have to change by more than half. The
-  // others may satisfy (1) without them. Ascending.
-  std::vector<int64_t> misfits;
-};
-
-RepairedMultipliers RepairMultipliers(
+//
+// The certificate has all observations of the problem; it is not verified, and
+// its defect is 0. None if the equations cannot be solved, or if a lambda would
+// have to change by more than half.
+std::optional<Certificate> RepairMultipliers(
     const KnownRotationProblem& problem, Norm norm, double delta,
     const std::vector<Multiplier>& multipliers,
     const RepairOptions& options = {});
