@@ -8,7 +8,6 @@
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
 #include "krot/joint/joint.h"
-#include "krot/pipeline/stages.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"
@@ -99,11 +98,6 @@ std::optional<PixelCertificate> ProveRefutation(
   BuiltProblem at_estimate = part;
   Reprojection(model, part)
       .TakeRows(refuted.estimate, context.num_threads, &at_estimate.problem);
-  const auto is_accepted = [&](const PixelCertificate& proof) {
-    return proof.lower_bound > bound.max_error &&
-           CheckPixelCertificate(model, part, bound.norm, proof, context)
-               .is_accepted;
-  };
   // Only the bound needs a proof: the margin of the rows' bound above it is
   // room for lens distortion.
   JointOptions options;
@@ -119,16 +113,10 @@ std::optional<PixelCertificate> ProveRefutation(
   proof.rows = *summary.certificate;
   proof.bearings = BearingsOfPoints(model, part, refuted.estimate, proof.rows);
   proof.lower_bound = (1 + 1e-9) * bound.max_error;
-  if (is_accepted(proof)) return proof;
-  // Below this there is no room for the regions of lenses.
-  if (summary.lower_bound < (1 + 1e-2) * bound.max_error) {
-    return std::nullopt;
-  }
-  std::optional<PixelCertificate> best =
-      ProveInPixels(model, at_estimate, refuted.estimate, bound.norm,
-                    refuted.support, proof.lower_bound, context);
-  if (!best || !is_accepted(*best)) return std::nullopt;
-  return best;
+  const bool is_accepted =
+      CheckPixelCertificate(model, part, bound.norm, proof, context)
+          .is_accepted;
+  return is_accepted ? std::optional(std::move(proof)) : std::nullopt;
 }
 
 std::vector<int64_t> Without(const std::vector<int64_t>& from,
