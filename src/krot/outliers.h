@@ -53,7 +53,8 @@ struct WeakPart {
   // Tracks of the input that both sides see, none where the part is a component
   // of its own; a frame's observations.
   int64_t num_tracks = 0;
-  // Of these, tracks that agree on one place and scale; observations kept.
+  int64_t num_of_three = 0;  // of these, tracks of three images or more
+  // Of num_tracks, tracks that agree on one place and scale; observations kept.
   int64_t num_agreeing = 0;
   // The part may be larger or smaller by this factor; >= 1.
   double scale_factor = 1;
@@ -130,6 +131,9 @@ struct OutlierFindings {
   std::vector<Suspect> tracks, images, cameras;
   std::optional<RotationSuspect> rotation_suspect;
   std::vector<WeakPart> weak_parts;  // from nothing
+  // From nothing, where the images show no baseline: with rotations turned by
+  // at most this, cameras in one place fit as well as those of the result.
+  std::optional<double> one_centre_turn_deg;
   std::optional<ErrorProfileSummary> profile;
 };
 

@@ -145,6 +145,84 @@ TEST(TracksInTwoComponents, AreNotToBeReliedOn) {
   EXPECT_TRUE(parts[0]["scale_factor"].is_null());
 }
 
+class OtherShapes : public ::testing::Test {
+ protected:
+  static SceneOptions Street() {
+    SceneOptions options = SmallScene();
+    options.layout = SceneLayout::kStreet;
+    options.camera_model_id = 1;
+    options.num_frames = 8;
+    options.num_points = 500;
+    return options;
+  }
+
+  KrotResult Solve(Model model, const Words& more) const {
+    model = WithoutTranslations(model);
+    for (Point3D& point : model.points3D) point.xyz.setZero();
+    Save(model, folder_ / "input");
+    return RunKrot({"solver", "--input_path", folder_ / "input",
+                    "--output_path", folder_ / "output", "--overwrite", "1",
+                    "--report_path", folder_ / "r.json"},
+                   more);
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(OtherShapes, ChainsOfPairsAreSaidToTellNoDistances) {
+  const KrotResult result = Solve(ChainOfPairs(SynthesizeScene(Street()).model),
+                                  {"--Solver.init", "feasible"});
+  EXPECT_EQ(result.exit_code, 10) << result.err;
+  EXPECT_THAT(result.err,
+              HasSubstr("tracks of two images alone, which tell directions but "
+                        "no distances; their scale against the rest is not "
+                        "held at all"));
+  EXPECT_THAT(result.err, Not(HasSubstr("rotations,")));
+}
+
+TEST_F(OtherShapes, PanoramasAreSaidToHaveNoBaseline) {
+  const Model truth = SynthesizeScene(Street()).ground_truth;
+  const KrotResult result = Solve(SeenFrom(truth, NearTheFirst(truth, 0), 0.5),
+                                  {"--Solver.init", "feasible"});
+  EXPECT_EQ(result.exit_code, 10) << result.err;
+  EXPECT_THAT(result.err,
+              HasSubstr("the images show no baseline: one place of all cameras "
+                        "explains the observations as well"));
+  EXPECT_EQ(ReadJson(folder_ / "r.json")["outliers"]["one_centre_turn_deg"], 0);
+}
+
+TEST_F(OtherShapes, ShortBaselinesAreSolved) {
+  const Model truth = SynthesizeScene(Street()).ground_truth;
+  Succeeded(Solve(SeenFrom(truth, NearTheFirst(truth, 0.05), 0.5),
+                  {"--Solver.init", "feasible"}));
+  EXPECT_TRUE(ReadJson(folder_ / "r.json")["outliers"]["one_centre_turn_deg"]
+                  .is_null());
+}
+
+TEST_F(OtherShapes, RotationsThatNobodyEstimatedAreNamed) {
+  const auto unturned = [](int, const RigidTransform& own) {
+    return RigidTransform{Eigen::Matrix3d::Identity(), own.translation};
+  };
+  Model model = SynthesizeScene(SmallScene()).model;
+  for (size_t n = 0; n < model.images.size(); ++n) {
+    model.images[n].cam_from_world = Pose();
+    model.frames[n].rig_from_world = Pose();
+  }
+  for (const Words& more : {Words(), Words{"--Solver.init", "feasible"}}) {
+    const KrotResult result = Solve(model, more);
+    EXPECT_EQ(result.exit_code, 10);
+    EXPECT_THAT(result.err, HasSubstr("all rotations are the identity"));
+  }
+  // Above the ground cameras need not turn: shifted, they see the scene from
+  // five times its extent.
+  Model truth = SynthesizeScene(Street()).ground_truth;
+  for (Point3D& point : truth.points3D) point.xyz[2] += 30;
+  const KrotResult result =
+      Solve(SeenFrom(truth, unturned, 0.5), {"--Solver.init", "feasible"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, Not(HasSubstr("identity")));
+}
+
 TEST(WrongRotations, AreNamedByTheirImages) {
   const TempFolder folder;
   SceneOptions options = SmallScene();

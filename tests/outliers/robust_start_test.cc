@@ -5,7 +5,9 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <random>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -359,6 +361,17 @@ TEST(FindRobustStart, ExplainsTracksOfTwo) {
             4);
 }
 
+// All of a pair's error may be that of one observation: half of the errors are
+// zero, and so is their median.
+TEST(FindRobustStart, FindsThePositionsOfTracksOfTwo) {
+  SceneOptions options = SceneOf(12, 1000, 2, 0.5);
+  options.camera_model_id = 1;
+  options.outlier_ratio = 0.2;
+  const SyntheticScene scene = SynthesizeScene(options);
+  EXPECT_LT(CentreError(scene.ground_truth, AtRobustStart(Wiped(scene.model))),
+            0.01);
+}
+
 TEST(FindWeakLinks, SaysThatTracksLeftOutHoldNothing) {
   SceneOptions options = SceneInParts(SceneLayout::kStreet);
   options.outlier_ratio = 0;
@@ -587,6 +600,109 @@ TEST(FilterOutliers, TakesOtherComponentsForPartsThatNothingHolds) {
   EXPECT_EQ(part.num_tracks, 0);
   EXPECT_EQ(part.scale_factor, kInfinity);
   EXPECT_FALSE(part.is_held);
+}
+
+SceneOptions Street(int num_frames) {
+  SceneOptions options = SceneOf(num_frames, 60 * num_frames, 5, 0.5);
+  options.layout = SceneLayout::kStreet;
+  options.camera_model_id = 1;
+  return options;
+}
+
+// Baselines of pairs tell no distances, unless they close a figure.
+TEST(FilterOutliers, NamesPartsOfChainsAndStarsOfPairsUntilOneScaleIsLeft) {
+  OutlierFilterOptions options;
+  options.find_conflicts = false;
+  const Model scene = SynthesizeScene(Street(9)).model;
+  const auto is_arm = [](int a, int b) { return a == 4 || b == 4; };
+  for (const Model& pairs : {ChainOfPairs(scene), OfPairs(scene, is_arm)}) {
+    const OutlierFilterSummary summary =
+        FilterOutliers(Wiped(pairs), options, {}).summary;
+    std::set<std::string> named;
+    for (const WeakPart& part : summary.weak_parts) {
+      EXPECT_FALSE(part.is_held);
+      EXPECT_GT(part.num_tracks, 0);
+      EXPECT_EQ(part.num_of_three, 0);
+      EXPECT_EQ(part.scale_factor, kInfinity);
+      named.insert(part.image_names.begin(), part.image_names.end());
+    }
+    std::set<ImageId> connected;
+    for (const TrackElement& element : pairs.track_elements) {
+      connected.insert(element.image_id);
+    }
+    // Images of which too few points tell depths are left, too: one of the
+    // star.
+    EXPECT_GE(named.size(), connected.size() - 3);
+  }
+}
+
+// The turn that is found where this share of the baselines is left and the
+// rotations of every other image are then turned by so much.
+std::optional<double> TurnAtOneCentre(const Model& truth, double share,
+                                      double degrees) {
+  Model model = SeenFrom(truth, NearTheFirst(truth, share), 0.5);
+  TurnPart([](int n) { return n % 2 == 1; }, degrees, &model);
+  OutlierFilterOptions options;
+  options.find_conflicts = false;
+  return FilterOutliers(Wiped(model), options, {}).summary.one_centre_turn_deg;
+}
+
+TEST(FindTurnAtOneCentre, TellsPanoramasFromShortBaselines) {
+  const Model truth = SynthesizeScene(Street(8)).ground_truth;
+  EXPECT_EQ(TurnAtOneCentre(truth, 0, 0), 0);
+  EXPECT_EQ(TurnAtOneCentre(truth, 1, 0), std::nullopt);
+  EXPECT_EQ(TurnAtOneCentre(truth, 0.05, 0), std::nullopt);
+}
+
+TEST(FindTurnAtOneCentre, AllowsForRotationsThatAreOff) {
+  const Model truth = SynthesizeScene(Street(8)).ground_truth;
+  const std::optional<double> turn = TurnAtOneCentre(truth, 0, 0.2);
+  ASSERT_TRUE(turn);
+  EXPECT_GT(*turn, 0.05);
+  EXPECT_LT(*turn, 0.3);
+}
+
+// Far from flat ground a shift is nearly a turn, but rotations are not off by
+// so much.
+TEST(FindTurnAtOneCentre, TakesNoLargeTurnForAnError) {
+  Model truth = SynthesizeScene(Street(8)).ground_truth;
+  for (Point3D& point : truth.points3D) point.xyz[2] += 30;
+  const auto unturned = [](int, const RigidTransform& own) {
+    return RigidTransform{Eigen::Matrix3d::Identity(), own.translation};
+  };
+  OutlierFilterOptions options;
+  options.find_conflicts = false;
+  const OutlierFilterResult result =
+      FilterOutliers(Wiped(SeenFrom(truth, unturned, 0.5)), options, {});
+  EXPECT_EQ(result.summary.one_centre_turn_deg, std::nullopt);
+}
+
+// A wrong observation may fit a point that is near enough.
+TEST(FindTurnAtOneCentre, IsNotMisledByWrongObservations) {
+  SceneOptions scene = Street(12);
+  scene.num_points = 200;
+  for (const uint64_t seed : {0u, 1u, 2u}) {
+    scene.random_seed = seed;
+    const Model truth = SynthesizeScene(scene).ground_truth;
+    Model model = Wiped(SeenFrom(truth, NearTheFirst(truth, 0), 0.5));
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> share(0, 1);
+    for (Image& image : model.images) {
+      for (Point2D& pixel : image.points2D) {
+        if (share(random) > 0.3) continue;
+        pixel.x = 1024 * share(random);
+        pixel.y = 768 * share(random);
+      }
+    }
+    OutlierFilterOptions options;
+    options.find_conflicts = false;
+    EXPECT_TRUE(FilterOutliers(model, options, {}).summary.one_centre_turn_deg)
+        << seed;
+  }
+}
+
+TEST(FindTurnAtOneCentre, CannotBeToldWithoutObservations) {
+  EXPECT_EQ(FindTurnAtOneCentre({}, {}, {}), std::nullopt);
 }
 
 TEST(WeakLink, IsNotHeldByTracksThatMayAgreeByChance) {

@@ -427,6 +427,37 @@ TEST(UnreliableSentence, SaysWhichImagesAreAComponentOfTheirOwn) {
                     HasSubstr("; if that is so of each part alone, look at")));
 }
 
+TEST(UnreliableSentence, SaysThatPairsOfImagesTellNoDistances) {
+  OutlierFilterSummary summary;
+  summary.init = SolveInit::kFeasible;
+  WeakPart& part = summary.weak_parts.emplace_back();
+  part.image_names = {"a.jpg", "b.jpg"};
+  part.num_tracks = 80;
+  part.scale_factor = kInfinity;
+  part.is_held = false;
+  EXPECT_THAT(UnreliableSentence(summary),
+              HasSubstr("80 tracks of two images alone, which tell directions "
+                        "but no distances; their scale against the rest is "
+                        "not held at all; match more"));
+  part.num_of_three = 1;
+  EXPECT_THAT(UnreliableSentence(summary),
+              HasSubstr("80 tracks, of which 0 agree; their scale"));
+}
+
+TEST(UnreliableSentence, SaysByWhichTurnImagesShowNoBaseline) {
+  OutlierFilterSummary summary;
+  summary.init = SolveInit::kFeasible;
+  summary.one_centre_turn_deg = 0;
+  EXPECT_THAT(UnreliableSentence(summary),
+              AllOf(HasSubstr("to be relied on: the images show no baseline: "
+                              "one place of all cameras explains"),
+                    Not(HasSubstr("match more"))));
+  summary.one_centre_turn_deg = 0.123;
+  EXPECT_THAT(UnreliableSentence(summary),
+              HasSubstr("no baseline: with rotations turned by at most 0.12 "
+                        "degrees, one place of all"));
+}
+
 TEST(SolveTable, AsksForAnAdjustmentWhereRoughRotationsSetTheBound) {
   SolveReport report = SomeReport();
   OutlierFilterSummary& outliers = report.outliers.emplace();

@@ -93,4 +93,78 @@ inline void TurnPart(const std::function<bool(int)>& is_turned, double degrees,
   }
 }
 
+// The same with tracks of two: of every track the first two images stay, by
+// their indices, of which `is_pair` says so; tracks without such two go.
+inline Model OfPairs(const Model& model,
+                     const std::function<bool(int, int)>& is_pair) {
+  std::map<ImageId, int> index_of;
+  for (size_t n = 0; n < model.images.size(); ++n) {
+    index_of[model.images[n].id] = static_cast<int>(n);
+  }
+  std::vector<char> is_removed(model.track_elements.size(), 1);
+  for (const Point3D& point : model.points3D) {
+    std::map<int, uint64_t> element_of;  // by image
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      element_of[index_of[model.track_elements[e].image_id]] = e;
+    }
+    bool has_pair = false;
+    for (const auto& [a, of_a] : element_of) {
+      for (const auto& [b, of_b] : element_of) {
+        if (has_pair || a >= b || !is_pair(a, b)) continue;
+        is_removed[of_a] = is_removed[of_b] = 0;
+        has_pair = true;
+      }
+    }
+  }
+  return RemoveObservations(model, is_removed).model;
+}
+
+inline Model ChainOfPairs(const Model& model) {
+  return OfPairs(model, [](int a, int b) { return b == a + 1; });
+}
+
+// What images at other poses would see, with noise: `pose_of` says where the
+// image of an index is instead, and its frame. What would be behind it goes.
+// Requires PINHOLE cameras and one for each frame.
+inline Model SeenFrom(
+    Model model,
+    const std::function<RigidTransform(int, const RigidTransform&)>& pose_of,
+    double noise_px) {
+  std::map<ImageId, int> index_of;
+  for (size_t n = 0; n < model.images.size(); ++n) {
+    const auto own = static_cast<int>(n);
+    index_of[model.images[n].id] = own;
+    Pose& pose = model.images[n].cam_from_world;
+    pose = ToPose(pose_of(own, pose.Transform()));
+    if (n < model.frames.size()) model.frames[n].rig_from_world = pose;
+  }
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, noise_px);
+  std::vector<char> is_removed;
+  for (const Point3D& point : model.points3D) {
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model.track_elements[e];
+      Image& image = model.images[index_of[element.image_id]];
+      const Eigen::Vector3d x = image.cam_from_world.Transform() * point.xyz;
+      const std::vector<double>& params = model.cameras[0].params;
+      Point2D& pixel = image.points2D[element.point2D_idx];
+      pixel.x = params[0] * x[0] / x[2] + params[2] + noise(random);
+      pixel.y = params[1] * x[1] / x[2] + params[3] + noise(random);
+      is_removed.push_back(!(x[2] > 0));
+    }
+  }
+  return RemoveObservations(model, is_removed).model;
+}
+
+// Of the baselines this share is left, around the first image. For SeenFrom.
+inline std::function<RigidTransform(int, const RigidTransform&)> NearTheFirst(
+    const Model& model, double share) {
+  const Eigen::Vector3d first =
+      Center(model.images[0].cam_from_world.Transform());
+  return [first, share](int, const RigidTransform& own) {
+    const Eigen::Vector3d centre = first + share * (Center(own) - first);
+    return RigidTransform{own.rotation, -(own.rotation * centre)};
+  };
+}
+
 }  // namespace krot::internal

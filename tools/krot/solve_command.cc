@@ -9,6 +9,7 @@
 #include "krot/base/write_file.h"
 #include "krot/database.h"
 #include "krot/outliers/match_tracks.h"
+#include "krot/outliers/robust_start.h"
 #include "krot/problem/cost.h"
 #include "krot/report/reports.h"
 #include "krot/report/text_table.h"
@@ -237,6 +238,38 @@ void ThrowIfNothingSoFar(const SolveReport& report) {
       "interrupted before there was an estimate, nothing was written");
 }
 
+bool AreIdentity(const Model& model) {
+  const auto all = [](const auto& items, const auto& pose_of) {
+    return std::all_of(items.begin(), items.end(), [&](const auto& item) {
+      return pose_of(item).Rotation().isIdentity(0);
+    });
+  };
+  return model.frames.empty()
+             ? all(model.images,
+                   [](const Image& image) { return image.cam_from_world; })
+             : all(model.frames,
+                   [](const Frame& frame) { return frame.rig_from_world; });
+}
+
+// Warns of rotations that nobody has estimated. Where cameras never turn, as
+// above the ground, the identity is right: the result tells.
+void WarnOfIdentity(const LogOptions& log, const Model& model,
+                    const SolveReport& report) {
+  const SolveTermination end = report.summary.termination;
+  const auto& outliers = report.outliers;
+  const bool fits =
+      end != SolveTermination::kInfeasible &&
+      end != SolveTermination::kNoStart &&
+      report.summary.pixel_error_after.mean <= kLevelOfStart &&
+      (!outliers || 2 * static_cast<int64_t>(outliers->removed.size()) <=
+                        outliers->num_observations);
+  if (fits || !AreIdentity(model)) return;
+  LogLine(log, 0,
+          "warning: all rotations are the identity, as where none were "
+          "estimated, and the observations do not fit them; expected those of "
+          "a mapper, of rotation averaging or of a sensor (--rotations_path)");
+}
+
 // Warns of errors that fell to zero and say nothing.
 void WarnOfEmptyFall(const LogOptions& log, const SolveSummary& summary) {
   const bool is_zero = IsZeroUpToRounding(summary.cost_final) &&
@@ -329,6 +362,7 @@ int RunSolveCommand(const SolveCommand& command) {
   if (command.method_name.empty()) {
     report.method = MethodName(report.summary.method);
   }
+  WarnOfIdentity(log, model, report);
   ThrowIfNoStart(command, report);
   ThrowIfNothingSoFar(report);
   if (command.join && !command.join(&model, &solved, &report.summary)) {

@@ -98,11 +98,17 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
                                const BoundedOptions& options,
                                const Context& context, Estimate* estimate);
 
+// Gives both observations of every track of two the mean of their squared
+// errors, since its point may take up either of them: medians would see zeros.
+void ShareErrorsOfPairs(const KnownRotationProblem& problem,
+                        std::vector<double>* squared_errors);
+
 // Moves points and frames to a local minimum of
 //
 //   sum_i c^2 r_i^2 / (c^2 + r_i^2),   c twice the median of the r_i,
 //
-// with r_i the residuals in pixels (p = 2) [Geman, McClure 1987], by Gauss and
+// with r_i the residuals in pixels (p = 2; in the median those of a pair have
+// their mean square) [Geman, McClure 1987], by Gauss and
 // Newton's method with weights (c^2 / (c^2 + r_i^2))^2. c is taken anew after
 // every step, at first as sixteen times the median, and half as many each time
 // [Blake, Zisserman 1987]. An observation that does not see its point counts

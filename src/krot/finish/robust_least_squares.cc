@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "krot/base/numbers.h"
@@ -60,8 +61,10 @@ class RobustLeastSquares {
   }
 
   void TakeScale() {  // a scale below 1e-6 pixels would be that of rounding
+    std::vector<double> squared = squared_errors_;
+    ShareErrorsOfPairs(problem_, &squared);
     scale2_ = std::pow(
-        std::max(1e-6, factor_ * std::sqrt(Median(squared_errors_))), 2);
+        std::max(1e-6, factor_ * std::sqrt(Median(std::move(squared)))), 2);
   }
   double Cost(const std::vector<double>& squared_errors) const {
     return loop_.Sum([&](int64_t i) {
@@ -286,6 +289,15 @@ class SoftestMotionSearch {
 };
 
 }  // namespace
+
+void ShareErrorsOfPairs(const KnownRotationProblem& problem,
+                        std::vector<double>* squared_errors) {
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    if (problem.point_begin[k + 1] - problem.point_begin[k] != 2) continue;
+    double* const pair = &(*squared_errors)[problem.point_begin[k]];
+    pair[0] = pair[1] = (pair[0] + pair[1]) / 2;
+  }
+}
 
 void MinimizeRobustly(const KnownRotationProblem& problem,
                       const Context& context, Estimate* estimate,

@@ -262,42 +262,59 @@ class OutlierFilter : private Filtering {
   }
 
   // Looks for weakly tied parts in the solved model, by all tracks of the
-  // input, for loose frames and, if all is held so far, for what moves softly.
+  // input, for loose frames and for what moves softly among what is held so
+  // far. Without baselines all of it would be noise.
   void FindWeakParts(const BuiltProblem& built) {
+    if (!summary_.is_bound_beyond_reason) {
+      BuildProblemOptions build = options_.solve.problem;
+      build.num_threads = context_.num_threads;
+      const BuiltProblem solved = BuildProblem(kept_.model, build);
+      summary_.one_centre_turn_deg =
+          FindTurnAtOneCentre(solved.problem, solved.start, context_);
+      if (summary_.one_centre_turn_deg) return;
+    }
     Estimate estimate = built.start;
     for (size_t f = 0; f < built.frame_of.size(); ++f) {
       estimate.translations[f] =
           kept_.model.frames[built.frame_of[f]].rig_from_world.translation;
     }
+    const double cap = kCapOfPoints * std::min(bound_.max_error, kLevelOfStart);
+    const std::vector<char> kept = AreKept(built);
+    std::vector<char> is_held(built.problem.num_frames, 1);
     const auto add = [&](const WeakLink& link) {
+      for (const int32_t f : link.frames) is_held[f] &= link.IsHeld();
       WeakPart& part = AddWeakPart(built, link.frames);
       part.num_tracks = link.num_tracks;
+      part.num_of_three = link.num_of_three;
       part.num_agreeing = link.num_agreeing;
       part.scale_factor = link.scale_factor;
       part.is_held = link.IsHeld();
       part.turn_deg = link.turn_deg;
       part.num_agreeing_turned = link.num_agreeing_turned;
     };
-    const double cap = kCapOfPoints * std::min(bound_.max_error, kLevelOfStart);
-    const std::vector<char> kept = AreKept(built);
     for (const WeakLink& link :
          FindWeakLinks(built.problem, estimate, kept, cap, context_)) {
       add(link);
     }
-    FindLooseFrames(built);
-    for (const WeakPart& part : summary_.weak_parts) {
-      if (!part.is_held) return;
+    FindLooseFrames(built, kept, &is_held);
+    for (;;) {
+      std::vector<char> counts = kept;
+      for (size_t i = 0; i < kept.size(); ++i) {
+        counts[i] &= is_held[built.problem.FrameOf(static_cast<int64_t>(i))];
+      }
+      const std::optional<WeakLink> soft =
+          FindSoftPart(built.problem, estimate, counts, cap, context_);
+      if (!soft || soft->IsHeld() || context_.IsCancelled()) return;
+      add(*soft);
     }
-    const std::optional<WeakLink> soft =
-        FindSoftPart(built.problem, estimate, kept, cap, context_);
-    if (soft && !soft->IsHeld()) add(*soft);
   }
 
   // Adds single frames that keep less than half of the usual share of their
   // observations, and fewer than chance explains (four standard deviations).
-  void FindLooseFrames(const BuiltProblem& built) {
+  // These are not held.
+  void FindLooseFrames(const BuiltProblem& built, const std::vector<char>& kept,
+                       std::vector<char>* is_held) {
     const KnownRotationProblem& problem = built.problem;
-    const std::vector<char> kept = AreKept(built);
     const double usual =
         static_cast<double>(std::count(kept.begin(), kept.end(), 1)) /
         static_cast<double>(kept.size());
@@ -317,6 +334,7 @@ class OutlierFilter : private Filtering {
       part.num_tracks = num_seen;
       part.num_agreeing = num_kept;
       part.is_held = false;
+      (*is_held)[f] = 0;
     }
   }
 

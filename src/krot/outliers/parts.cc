@@ -250,17 +250,28 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
   return part_of;
 }
 
+std::vector<double> SquaredErrorsAt(const KnownRotationProblem& problem,
+                                    const Estimate& estimate) {
+  std::vector<double> squared;
+  for (const Observation& o : problem.observations) {
+    const double error =
+        ResidualOf(ViewPoint(problem, o, estimate), Norm::L2());
+    squared.push_back(error * error);
+  }
+  return squared;
+}
+
 double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
                const std::function<bool(int64_t i)>& counts) {
+  std::vector<double> squared = SquaredErrorsAt(problem, estimate);
+  ShareErrorsOfPairs(problem, &squared);
   std::vector<double> errors;
   for (size_t n = 0; n < problem.observations.size(); ++n) {
-    const Observation& o = problem.observations[n];
-    const auto rows =
-        2.0 * static_cast<double>(problem.point_begin[o.point + 1] -
-                                  problem.point_begin[o.point]);
+    const int32_t k = problem.observations[n].point;
+    const auto rows = 2.0 * static_cast<double>(problem.point_begin[k + 1] -
+                                                problem.point_begin[k]);
     if (rows <= 3 || !counts(static_cast<int64_t>(n))) continue;
-    errors.push_back(ResidualOf(ViewPoint(problem, o, estimate), Norm::L2()) *
-                     std::sqrt(rows / (rows - 3)));
+    errors.push_back(std::sqrt(squared[n] * rows / (rows - 3)));
   }
   if (errors.empty()) return kLeastNoisePx;
   return std::max(kLeastNoisePx,
@@ -306,12 +317,15 @@ std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
   link.frames = sides[sides[1].size() <= sides[0].size()];
   for (int32_t k = 0; k < problem.num_points; ++k) {
     bool sees[3] = {}, agrees[3] = {};
+    int32_t count = 0;  // of the sides' observations
     for (const int64_t i : problem.OfPoint(k)) {
       const int side = side_of[problem.FrameOf(i)];
       sees[side] = true;
       agrees[side] = agrees[side] || kept[i];
+      count += side < 2;
     }
     link.num_tracks += sees[0] && sees[1];
+    link.num_of_three += sees[0] && sees[1] && count > 2;
     link.num_agreeing += agrees[0] && agrees[1];
   }
   link.num_telling = link.num_agreeing;  // the others are not kept

@@ -232,8 +232,9 @@ class PlaceSearch {
 struct WeakLink {
   std::vector<int32_t> frames;  // of the smaller group, ascending
   int64_t num_tracks = 0;       // that frames of both groups see
-  // Of these: the tracks that say something about place and scale, and those
-  // among them that agree with the best place and scale.
+  int64_t num_of_three = 0;     // of these, with three observations or more
+  // Of num_tracks: the tracks that say something about place and scale, and
+  // those among them that agree with the best place and scale.
   int64_t num_telling = 0;
   int64_t num_agreeing = 0;
   // Of the tracks within groups, those with which all their observations agree.
@@ -286,6 +287,25 @@ std::optional<WeakLink> FindSoftPart(const KnownRotationProblem& problem,
                                      const std::vector<char>& kept, double cap,
                                      const Context& context);
 
+// Averaged rotations are off by tenths of a degree. If turns up to this could
+// stand for all baselines, such errors could be a tenth of these; radians.
+inline constexpr double kLikelyTurn = 1 / kDegreesPerRadian;
+
+// The largest turn of a frame, degrees, with which one common centre of all
+// frames explains the observations as well as the estimate does, which must be
+// one of least squares: then nothing tells baselines from noise and errors of
+// the rotations. Of F frames and K points baselines and depths are 3 F and K
+// parameters, which fit noise of variance sigma^2 by at most
+// 2 (3 F + K) sigma^2, as the largest singular value of a matrix of such noise
+// is at most sigma (sqrt(3 F) + sqrt(K)). None if one centre explains less or
+// only with turns above kLikelyTurn, where observations are too few to tell, or
+// with baselines in rigs.
+// Turns and directions are improved in turn, for as long as they may get there;
+// O(observations) each time.
+std::optional<double> FindTurnAtOneCentre(const KnownRotationProblem& problem,
+                                          const Estimate& estimate,
+                                          const Context& context);
+
 // The links between the parts of an estimate, of which only the translations
 // are used: how much could the scales differ from the estimate's?
 // For every scale on a fine logarithmic grid the best place is found. Scales
@@ -299,6 +319,10 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
                                     const Estimate& estimate,
                                     const std::vector<char>& kept, double cap,
                                     const Context& context);
+
+// Of every observation; infinite where it does not see its point.
+std::vector<double> SquaredErrorsAt(const KnownRotationProblem& problem,
+                                    const Estimate& estimate);
 
 // The noise per axis, pixels, from the median error of the observations that
 // count, each freed of what its own track's point has fitted of it. Tracks of

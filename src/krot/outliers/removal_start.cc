@@ -2,18 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <sstream>
 #include <string>
 #include <utility>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
 #include "krot/analysis/noise.h"
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
+#include "krot/base/parallel_for.h"
 #include "krot/convert/reprojection.h"
 #include "krot/model/derived_models.h"
+#include "krot/outliers/parts.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/pipeline/stages.h"
+#include "krot/problem/gauge.h"
 
 namespace krot::internal {
 namespace {
@@ -33,13 +40,11 @@ class Profiler {
   }
 
   ErrorProfile Run() {
-    Removal nothing;
-    nothing.estimate = built_.start;
     const auto at_level = [this](int n) {
       return context_.Within("error profile, level " + std::to_string(n) +
                              " of about " + std::to_string(kNumLevels));
     };
-    profile_.levels.push_back(Solve(std::move(nothing), at_level(0)));
+    profile_.levels.push_back(Solve({{}, built_.start}, at_level(0)));
     const double first = profile_.levels[0].max_error;
     const double noise = profile_.noise.max_error;
     const bool has_outliers = profile_.levels[0].lower_bound > noise;
@@ -136,11 +141,16 @@ NoiseLimit LimitOfFitting(const Model& model, Norm norm,
   const std::vector<double> errors = PixelErrors(model, context.num_threads);
   std::vector<double> of_noise;  // as if no point had been fitted
   for (const Point3D& point : model.points3D) {
-    const auto rows =
-        2 * static_cast<double>(point.track_end - point.track_begin);
-    if (rows < 6) continue;
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      of_noise.push_back(errors[e] * std::sqrt(rows / (rows - 3)));
+    const uint64_t begin = point.track_begin, end = point.track_end;
+    const auto rows = 2 * static_cast<double>(end - begin);
+    if (rows < 4) continue;
+    for (uint64_t e = begin; e < end; ++e) {
+      // The point of a pair may take up either error.
+      const double error =
+          rows > 4
+              ? errors[e]
+              : std::hypot(errors[begin], errors[begin + 1]) / std::sqrt(2);
+      of_noise.push_back(error * std::sqrt(rows / (rows - 3)));
     }
   }
   if (of_noise.empty()) return limit;
@@ -254,6 +264,136 @@ RemovalStart FindRemovalStart(const Model& model,
   }
   if (options.has_start_from_nothing) start.init = SolveInit::kFeasible;
   return start;
+}
+
+namespace {
+using Eigen::Vector3d;
+
+// What FindTurnAtOneCentre tries: directions of points, and turns of frames.
+class OneCentre {
+ public:
+  OneCentre(const KnownRotationProblem& problem, const Estimate& estimate,
+            const Context& context)
+      : problem_(problem),
+        context_(context),
+        turns_(problem.num_frames, Eigen::Matrix3d::Identity()),
+        directions_(problem.num_points),
+        at_estimate_(SquaredErrorsAt(problem, estimate)),
+        excess_(problem.num_points),
+        squared_(problem.observations.size(), 0) {
+    const double num_of_frames = 3.0 * problem.num_frames;
+    const double num_free = 2.0 * static_cast<double>(squared_.size()) -
+                            3.0 * problem.num_points - num_of_frames;
+    if (!(num_free > 0) || HasBaseline(problem)) return;
+    variance_ =
+        (1 + num_of_frames / num_free) *
+        std::pow(NoiseOf(problem, estimate, [](int64_t) { return true; }), 2);
+    limit_ = 2 * variance_ * (problem.num_points + num_of_frames);
+  }
+
+  std::optional<double> Run() {
+    if (!(limit_ > 0)) return std::nullopt;
+    double excess = FindDirections();
+    while (excess > limit_ && !context_.IsCancelled()) {
+      const double before = excess;
+      TurnFrames();
+      excess = FindDirections();
+      // A hundred more steps like this one would not do.
+      if (!(before - excess > 0.01 * (excess - limit_))) return std::nullopt;
+    }
+    if (!(excess <= limit_)) return std::nullopt;
+    double largest = 0;
+    for (const Eigen::Matrix3d& turn : turns_) {
+      largest = std::max(largest, Eigen::AngleAxisd(turn).angle());
+    }
+    if (largest > kLikelyTurn) return std::nullopt;
+    return largest * kDegreesPerRadian;
+  }
+
+ private:
+  ViewedPoint Seen(int64_t i) const {
+    const Observation& o = problem_.observations[i];
+    const View& view = problem_.views[o.view];
+    AffineMap camera = AffineMap::Zero();
+    camera.leftCols<3>() =
+        view.cam_from_world_rotation * turns_[view.frame].transpose();
+    return ViewPoint(camera, o, directions_[o.point]);
+  }
+  double WeightOf(int64_t i) const {
+    return std::pow(scale2_ / (scale2_ + squared_[i]), 2);
+  }
+
+  // Every point takes the mean of its rays as they are turned. Returns by how
+  // much its squared errors exceed the estimate's, in all.
+  double FindDirections() {
+    ParallelForEach(problem_.num_points, context_.num_threads, [&](int64_t k) {
+      Vector3d sum = Vector3d::Zero();
+      for (const int64_t i : problem_.OfPoint(k)) {
+        sum += WeightOf(i) *
+               (turns_[problem_.FrameOf(i)] * DirectionOf(problem_, i));
+      }
+      directions_[k] = sum.normalized();
+      double sum_excess = 0, largest = 0;
+      for (const int64_t i : problem_.OfPoint(k)) {
+        squared_[i] = std::pow(ResidualOf(Seen(i), Norm::L2()), 2);
+        sum_excess += squared_[i] - at_estimate_[i];
+        largest = std::max(largest, squared_[i] - at_estimate_[i]);
+      }
+      // A wrong observation may agree by chance, at some distance: it counts
+      // for no more than this, and so does a pair.
+      const double most = kCutOff * variance_;
+      const int64_t length =
+          problem_.point_begin[k + 1] - problem_.point_begin[k];
+      excess_[k] = length == 2 ? std::min(sum_excess, most)
+                               : sum_excess - std::max(0.0, largest - most);
+    });
+    scale2_ = std::max(16 * variance_, 4 * Median(squared_));
+    return std::accumulate(excess_.begin(), excess_.end(), 0.0);
+  }
+
+  // Turns every frame to fit the directions. T' = exp([a]) T has
+  // T'^T u = T^T (u + u x a), to first order.
+  void TurnFrames() {
+    ParallelForEach(problem_.num_frames, context_.num_threads, [&](int64_t f) {
+      Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+      Vector3d g = Vector3d::Zero();
+      for (const int32_t i : problem_.OfFrame(f)) {
+        if (!std::isfinite(squared_[i])) continue;
+        const Observation& o = problem_.observations[i];
+        const ViewedPoint seen = Seen(i);
+        const Eigen::Vector2d r = seen.v / seen.depth;
+        const Eigen::Matrix<double, 2, 3> by_ray =
+            (o.E.bottomRows<2>() - r * o.E.row(0)) / seen.depth *
+            problem_.views[o.view].cam_from_world_rotation *
+            turns_[f].transpose();
+        const auto J = by_ray.rowwise().cross(directions_[o.point].transpose());
+        H += WeightOf(i) * J.transpose() * J;
+        g += WeightOf(i) * J.transpose() * r;
+      }
+      const Vector3d a = -(H.ldlt().solve(g));
+      if (!a.allFinite() || a.isZero(0)) return;
+      turns_[f] = Eigen::AngleAxisd(a.norm(), a.normalized()) * turns_[f];
+    });
+  }
+
+  const KnownRotationProblem& problem_;
+  const Context& context_;
+  std::vector<Eigen::Matrix3d> turns_;  // of frames, in the world
+  std::vector<Vector3d> directions_;    // of points, in the world
+  std::vector<double> at_estimate_;     // squared errors there
+  std::vector<double> excess_;          // of points, above these
+  std::vector<double> squared_;         // errors at one centre
+  double scale2_ = 1;    // c^2 of MinimizeRobustly, whose weights these are
+  double variance_ = 0;  // of the noise, per axis
+  double limit_ = 0;     // of an excess by noise; 0: it cannot be told
+};
+
+}  // namespace
+
+std::optional<double> FindTurnAtOneCentre(const KnownRotationProblem& problem,
+                                          const Estimate& estimate,
+                                          const Context& context) {
+  return OneCentre(problem, estimate, context).Run();
 }
 
 }  // namespace krot::internal

@@ -126,20 +126,22 @@ class Joiner {
   }
 
   // The tracks that frames of a and b (marked) see, with at least `min_seen`
-  // observations on one side; *num_shared is how many both see in all.
+  // observations on one side; counts in *link how many both see in all.
   std::vector<SharedTrack> TracksOf(const std::vector<char>& of_a,
                                     const std::vector<char>& of_b,
-                                    size_t min_seen, int64_t* num_shared) {
+                                    size_t min_seen, WeakLink* link) {
     std::vector<int32_t> points;
     for (int32_t k = 0; k < problem_.num_points; ++k) {
-      bool has_a = false, has_b = false;
+      int32_t num_a = 0, num_b = 0;
       for (const int64_t i : problem_.OfPoint(k)) {
-        has_a |= of_a[problem_.FrameOf(i)] != 0;
-        has_b |= of_b[problem_.FrameOf(i)] != 0;
+        num_a += of_a[problem_.FrameOf(i)];
+        num_b += of_b[problem_.FrameOf(i)];
       }
-      if (has_a && has_b) points.push_back(k);
+      if (num_a == 0 || num_b == 0) continue;
+      points.push_back(k);
+      link->num_of_three += num_a + num_b > 2;
     }
-    *num_shared = static_cast<int64_t>(points.size());
+    link->num_tracks = static_cast<int64_t>(points.size());
     std::vector<Side> a = SidesOf(points, of_a);
     std::vector<Side> b = SidesOf(points, of_b);
     std::vector<SharedTrack> tracks;
@@ -192,7 +194,7 @@ class Joiner {
     WeakLink link;
     // A track that one frame of each group sees proposes no scale.
     const std::vector<SharedTrack> all =
-        TracksOf(FramesOf(pair.a), FramesOf(pair.b), 2, &link.num_tracks);
+        TracksOf(FramesOf(pair.a), FramesOf(pair.b), 2, &link);
     link.num_telling = static_cast<int64_t>(all.size());
     link.usual_share = usual_share_;
     std::vector<SharedTrack> some;
@@ -256,8 +258,8 @@ class Joiner {
     std::vector<char> others;
     for (const char is_own : group) others.push_back(is_own == 0);
     WeakLink of_all = *link;
-    std::vector<SharedTrack> all =
-        TracksOf(others, group, 1, &of_all.num_tracks);
+    of_all.num_of_three = 0;
+    std::vector<SharedTrack> all = TracksOf(others, group, 1, &of_all);
     of_all.num_telling = static_cast<int64_t>(all.size());
     const PlaceSearch tracks(problem_, estimate_, sigma_, std::move(all));
     of_all.num_agreeing = tracks.NumAgreeing(Place());

@@ -99,6 +99,7 @@ std::string OutlierJson(const OutlierReport& report) {
   json["solve"] = JsonIf(summary.solve, SolveOfRestJson);
   json["num_solves"] = summary.num_solves;
   json["weak_parts"] = WeakPartsJson(summary);
+  json["one_centre_turn_deg"] = summary.one_centre_turn_deg;
   json["removed"] = ListJson(summary.removed, RemovedJson);
   json["suspects"] = {
       {"tracks", SuspectsJson(summary.tracks, "point3D_id", summary)},
@@ -157,8 +158,9 @@ std::string OutlierCsv(const OutlierFilterSummary& summary) {
 
 Json WeakPartsJson(const OutlierFilterSummary& summary) {
   return ListJson(summary.weak_parts, [](const WeakPart& part) {
-    return KROT_JSON_OF(part, is_frame, image_names, num_tracks, num_agreeing,
-                        scale_factor, is_held, turn_deg, num_agreeing_turned);
+    return KROT_JSON_OF(part, is_frame, image_names, num_tracks, num_of_three,
+                        num_agreeing, scale_factor, is_held, turn_deg,
+                        num_agreeing_turned);
   });
 }
 

@@ -15,7 +15,8 @@ namespace {
 
 // About a part that is not held: "44 images (P1180141.JPG to P1180184.JPG) hang
 // on the rest by 14 tracks, of which 9 agree; their scale against the rest is
-// held to a factor of 1.80 only".
+// held to a factor of 1.80 only". Two images may agree on a track at any
+// distance.
 std::string WeakPartWords(const WeakPart& part) {
   const auto count = static_cast<int64_t>(part.image_names.size());
   const auto [first, last] =
@@ -29,10 +30,12 @@ std::string WeakPartWords(const WeakPart& part) {
            "against it";
   }
   return images + (count == 1 ? "hangs" : "hang") + " on the rest by " +
-         Counted(part.num_tracks, "track") + ", of which " +
-         std::to_string(part.num_agreeing) +
-         (part.num_agreeing == 1 ? " agrees" : " agree") + "; their " +
-         (part.scale_factor <= 1.1 ? "place and " : "") +
+         Counted(part.num_tracks, "track") +
+         (part.num_of_three == 0
+              ? " of two images alone, which tell directions but no distances"
+              : ", of which " + std::to_string(part.num_agreeing) +
+                    (part.num_agreeing == 1 ? " agrees" : " agree")) +
+         "; their " + TextIf(part.scale_factor <= 1.1, "place and ") +
          "scale against the rest " +
          (part.scale_factor <= 1.1 ? "are not known"
           : std::isfinite(part.scale_factor)
@@ -69,11 +72,26 @@ std::string LooseFrameWords(const std::vector<WeakPart>& parts) {
          " out";
 }
 
+// "the images show no baseline: with rotations turned by at most 0.12 degrees,
+// one centre of all cameras explains the observations as well; ...".
+std::string OneCentreWords(double turn_deg) {
+  return "the images show no baseline: " +
+         TextIf(turn_deg >= 0.005, "with rotations turned by at most " +
+                                       FormatNumber(turn_deg, 2) +
+                                       " degrees, ") +
+         "one place of all cameras explains the observations as well as "
+         "different ones; positions need photos from different places, a "
+         "panorama needs rotations alone";
+}
+
 }  // namespace
 
 std::string UnreliableSentence(const OutlierFilterSummary& summary) {
   if (summary.init != SolveInit::kFeasible) return "";
   std::string words;
+  if (summary.one_centre_turn_deg) {
+    words = OneCentreWords(*summary.one_centre_turn_deg);
+  }
   const auto add = [&](const std::string& reason) {
     words += (words.empty() ? "" : "; ") + reason;
   };
@@ -88,7 +106,7 @@ std::string UnreliableSentence(const OutlierFilterSummary& summary) {
     add(Counted(parts.size() - num_told, "smaller part", "is", "are") +
         " not held either (--report_path lists all)");
   }
-  if (!words.empty()) {
+  if (!parts.empty()) {
     words +=
         "; match more pairs of images across, or take the parts as models of "
         "their own";

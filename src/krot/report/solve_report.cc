@@ -214,6 +214,7 @@ Json OutliersJson(const OutlierFilterSummary& outliers) {
       Joined({{"max_error", outliers.max_error}}, OutlierCountsJson(outliers)),
       {{"is_search_complete", outliers.is_search_complete},
        {"weak_parts", WeakPartsJson(outliers)},
+       {"one_centre_turn_deg", outliers.one_centre_turn_deg},
        {"seconds",
         {{"removal", outliers.seconds_removal},
          {"conflicts", outliers.seconds_conflicts},
