@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -314,6 +315,90 @@ TEST(RestoreGauge, LeavesFramesAndPointsWithoutObservationsWhereTheyAre) {
   EXPECT_EQ(moved.translations.back(), Vector3d(2, 4, 6));
   EXPECT_EQ(moved.points.back(), Vector3d(8, 10, 12));
   EXPECT_NEAR((moved.points[0] - scene.estimate.points[0]).norm(), 0, 1e-12);
+}
+
+// Centres of the frames and a point, wanted within half a unit of where they
+// are, each in an ellipsoid of its own.
+std::vector<WantedPlace> PlacesAround(const RandomScene& scene,
+                                      const Estimate& at) {
+  std::mt19937 generator(5);
+  std::uniform_real_distribution<double> uniform(-0.5, 0.5);
+  std::vector<WantedPlace> places;
+  const std::vector<Vector3d> now = Centres(scene.problem, at);
+  const std::vector<Vector3d> wanted = Centres(scene.problem, scene.estimate);
+  const auto add = [&](int32_t frame, int32_t point, const Vector3d& x,
+                       const Vector3d& centre) {
+    const Vector3d off(uniform(generator), uniform(generator),
+                       uniform(generator));
+    places.push_back({frame, point, x, centre + off,
+                      Vector3d(1, 2, 3 + off.x()).asDiagonal()});
+  };
+  for (size_t v = 0; v < now.size(); ++v) {
+    add(scene.problem.views[v].frame, -1, now[v], wanted[v]);
+  }
+  add(-1, 3, at.points[3], scene.estimate.points[3]);
+  return places;
+}
+
+double LargestRatio(const RandomScene& scene, const Estimate& estimate,
+                    const std::vector<WantedPlace>& places) {
+  const std::vector<Vector3d> centres = Centres(scene.problem, estimate);
+  double largest = 0;
+  for (size_t n = 0; n < places.size(); ++n) {
+    const WantedPlace& place = places[n];
+    const Vector3d& x =
+        place.frame >= 0 ? centres[n] : estimate.points[place.point];
+    largest =
+        std::max(largest, (place.unit_from_world * (x - place.centre)).norm());
+  }
+  return largest;
+}
+
+// The largest ratio is convex in the move, so where no small move lowers it by
+// much, no move does.
+TEST(MoveToPlaces, LeavesAMoveThatHardlyAnySmallOneImproves) {
+  const RandomScene scene = MakeRandomScene({});
+  const Estimate far = Moved(scene.problem, scene.estimate, 3, {10, -20, 5});
+  const std::vector<WantedPlace> places = PlacesAround(scene, far);
+  Estimate moved = far;
+  MoveToPlaces(scene.problem, places, &moved);
+  const double largest = LargestRatio(scene, moved, places);
+  EXPECT_LT(largest, 0.1 * LargestRatio(scene, far, places));
+  EXPECT_NEAR(Cost(scene.problem, moved, Norm::L2(), 1),
+              Cost(scene.problem, far, Norm::L2(), 1), 1e-9);
+
+  std::mt19937 generator(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int trial = 0; trial < 10000; ++trial) {
+    const double size = std::pow(10, -1.5 + 1.5 * uniform(generator));
+    const double scale = std::exp(size * uniform(generator));
+    const Vector3d shift(uniform(generator), uniform(generator),
+                         uniform(generator));
+    ASSERT_GT(
+        LargestRatio(scene, Moved(scene.problem, moved, scale, size * shift),
+                     places),
+        0.98 * largest);
+  }
+}
+
+TEST(MoveToPlaces, KeepsTheScaleThatABaselineHoldsAndWhatIsFixed) {
+  const RandomScene rigs = MakeRandomScene({5, 20, 2, 0.3});
+  Estimate moved = rigs.estimate;
+  for (Vector3d& t : moved.translations) t *= 2;
+  const Estimate far = moved;
+  const std::vector<WantedPlace> places = PlacesAround(rigs, far);
+  MoveToPlaces(rigs.problem, places, &moved);
+  EXPECT_LT(LargestRatio(rigs, moved, places), LargestRatio(rigs, far, places));
+  EXPECT_NEAR((moved.points[0] - moved.points[1]).norm(),
+              (far.points[0] - far.points[1]).norm(), 1e-12);
+
+  RandomScene fixed = MakeRandomScene({});
+  fixed.problem.fixed_points.resize(fixed.problem.num_points);
+  fixed.problem.fixed_points[2] = fixed.estimate.points[2];
+  Estimate same = fixed.estimate;
+  MoveToPlaces(fixed.problem, PlacesAround(fixed, same), &same);
+  EXPECT_EQ(same.points, fixed.estimate.points);
+  EXPECT_EQ(same.translations, fixed.estimate.translations);
 }
 
 TEST(RestoreGaugeIfHarmless, DoesTheSameWhereNothingIsLost) {

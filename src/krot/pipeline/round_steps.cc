@@ -11,6 +11,7 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
 
 namespace krot::internal {
 namespace {
@@ -162,14 +163,17 @@ KeptPositions::KeptPositions(const Model& model,
 // rows and `cost` the levelled cost of the estimate, in pixels; `ratio` is the
 // largest ratio of a camera's distance from its position to its radius.
 std::optional<double> KeptPositions::NextLevel(double optimum, double cost,
-                                               double ratio) {
+                                               double ratio,
+                                               bool is_held_back) {
   // The smallest slope that is assumed when choosing how far above the fixed
   // point the next level is.
   constexpr double kLeastSlope = 0.5;
   const double level = built_.position_level;
   const bool is_kept = ratio <= 1 + kKeptInRounds;
   // Where no position holds a camera back, the level does not matter.
-  if (is_kept && level * ratio < (1 - tolerance_) * cost) return std::nullopt;
+  if (is_kept && !is_held_back && level * ratio < (1 - tolerance_) * cost) {
+    return std::nullopt;
+  }
   if (!(optimum > 0)) return std::nullopt;
   const double x = std::log(level);
   const double y = std::log(optimum);
@@ -206,10 +210,36 @@ void KeptPositions::Keep(const Estimate& estimate) {
   cost_ = cost;
 }
 
+void KeptPositions::MoveInside(Estimate* estimate) const {
+  KnownRotationProblem of_model = built_.problem;
+  of_model.observations.clear();
+  for (size_t i = 0; i < built_.problem.observations.size(); ++i) {
+    if (!reprojection_.IsOfModel(static_cast<int64_t>(i))) continue;
+    of_model.observations.push_back(built_.problem.observations[i]);
+  }
+  IndexObservations(&of_model);
+  std::vector<WantedPlace> places;
+  for (const BuiltPosition& position : built_.positions) {
+    WantedPlace place;
+    place.centre = position.region.centre;
+    place.unit_from_world = position.unit_from_world;
+    const Vector3d offset = OffsetOf(built_, *estimate, position);
+    if (position.of == KnownPosition::Of::kImage) {
+      place.frame = built_.problem.views[position.index].frame;
+      place.x = place.centre + offset;
+    } else {
+      place.point = position.index;
+      place.x = place.centre - offset;
+    }
+    places.push_back(place);
+  }
+  MoveToPlaces(of_model, places, estimate);
+}
+
 bool KeptPositions::TakeLevel(const Estimate& estimate, double optimum,
-                              double cost) {
-  const std::optional<double> level =
-      NextLevel(optimum, cost, LargestPositionRatio(built_, estimate));
+                              double cost, bool is_held_back) {
+  const std::optional<double> level = NextLevel(
+      optimum, cost, LargestPositionRatio(built_, estimate), is_held_back);
   if (level) SetLevel(estimate, *level);
   return level.has_value();
 }

@@ -140,10 +140,17 @@ class KeptPositions {
   // Remembers the estimate if it keeps all positions and is the best so far.
   void Keep(const Estimate& estimate);
 
+  // Moves the estimate as a whole to where it keeps the positions best. The
+  // three cones of a position leave gaps outside its region into which a
+  // solve's free shift and scale may drift.
+  void MoveInside(Estimate* estimate) const;
+
   // Call it after a round whose rows' optimum was `optimum` and that ended at
-  // `estimate` with a levelled cost of `cost`. Returns whether another level is
-  // needed; if so, the rows of `built` are taken anew at that level.
-  bool TakeLevel(const Estimate& estimate, double optimum, double cost);
+  // `estimate` with a levelled cost of `cost`. `is_held_back` says whether the
+  // rows' proof rests on a position. Returns whether another level is needed;
+  // if so, the rows of `built` are taken anew at that level.
+  bool TakeLevel(const Estimate& estimate, double optimum, double cost,
+                 bool is_held_back);
 
   // Tries to prove, from the rows' certificate and its support, that no
   // estimate which keeps the positions has all errors below
@@ -164,7 +171,8 @@ class KeptPositions {
                                   context_.num_threads);
   }
   void SetLevel(const Estimate& estimate, double level) const;
-  std::optional<double> NextLevel(double optimum, double cost, double ratio);
+  std::optional<double> NextLevel(double optimum, double cost, double ratio,
+                                  bool is_held_back);
 
   const Model& model_;
   const SolveModelOptions& options_;

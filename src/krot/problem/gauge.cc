@@ -1,5 +1,6 @@
 #include "krot/problem/gauge.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -160,6 +161,78 @@ std::vector<char> ScaleIsFree(const std::vector<FrameGeometry>& frames,
   return scale_is_free;
 }
 
+void MoveComponents(const KnownRotationProblem& problem,
+                    const std::vector<FrameGeometry>& frames,
+                    const Components& components,
+                    const std::vector<Move>& moves, Estimate* estimate) {
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    const int32_t component = components.of_frame[f];
+    if (component < 0 || problem.IsFixedFrame(f)) continue;
+    Vector3d& t = estimate->translations[f];
+    const Vector3d shift =
+        moves[component].Shift(ProjectionCentre(frames[f], t));
+    t -= frames[f].world_from_rig.transpose() * shift;
+  }
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    const int32_t component = components.of_point[k];
+    if (component < 0 || problem.IsFixedPoint(k)) continue;
+    estimate->points[k] += moves[component].Shift(estimate->points[k]);
+  }
+}
+
+// The move of a component that makes the largest |U (x - g)| of its places
+// nearly the least.
+Move MoveTo(const std::vector<const WantedPlace*>& places, bool scale_is_free) {
+  constexpr int kNumReweightings = 100;
+  Vector3d mean = Vector3d::Zero();
+  for (const WantedPlace* p : places) {
+    mean += p->x / static_cast<double>(places.size());
+  }
+  double extent = 0;
+  for (const WantedPlace* p : places) {
+    extent = std::max(extent, (p->x - mean).norm());
+  }
+  const int num_unknowns =
+      scale_is_free && extent > kCoincident * mean.norm() ? 4 : 3;
+
+  Move best;
+  double least = kInfinity;
+  Move move;
+  std::vector<double> weights(places.size(), 1);
+  for (int n = 0; n <= kNumReweightings; ++n) {
+    std::vector<double> ratios;
+    for (const WantedPlace* p : places) {
+      ratios.push_back(
+          (p->unit_from_world * (p->x + move.Shift(p->x) - p->centre)).norm());
+    }
+    const double largest = *std::max_element(ratios.begin(), ratios.end());
+    if (largest < least) {
+      least = largest;
+      best = move;
+    }
+    if (!(largest > 0)) break;
+    // The unknowns are the shift of the mean and the change of scale, in units
+    // of the extent.
+    Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d b = Eigen::Vector4d::Zero();
+    for (size_t i = 0; i < places.size(); ++i) {
+      const WantedPlace& p = *places[i];
+      if (n > 0) weights[i] *= ratios[i] / largest;
+      Eigen::Matrix<double, 3, 4> J;
+      J << p.unit_from_world, p.unit_from_world * ((p.x - mean) / extent);
+      A += weights[i] * J.transpose() * J;
+      b -= weights[i] * J.transpose() * (p.unit_from_world * (p.x - p.centre));
+    }
+    const Eigen::VectorXd solution = A.topLeftCorner(num_unknowns, num_unknowns)
+                                         .completeOrthogonalDecomposition()
+                                         .solve(b.head(num_unknowns));
+    const double scale = num_unknowns == 4 ? 1 + solution[3] / extent : 1;
+    if (!solution.allFinite() || !(scale > 0)) break;
+    move = {mean, mean + solution.head<3>(), scale};
+  }
+  return best;
+}
+
 // For each frame, the median distance of the points that it sees.
 std::vector<double> TypicalDistances(const KnownRotationProblem& problem,
                                      const Estimate& estimate,
@@ -252,19 +325,7 @@ void RestoreGauge(const KnownRotationProblem& problem,
     }
   }
 
-  for (int32_t f = 0; f < problem.num_frames; ++f) {
-    const int32_t component = components.of_frame[f];
-    if (component < 0 || problem.IsFixedFrame(f)) continue;
-    Vector3d& t = estimate->translations[f];
-    const Vector3d shift =
-        moves[component].Shift(ProjectionCentre(frames[f], t));
-    t -= frames[f].world_from_rig.transpose() * shift;
-  }
-  for (int32_t k = 0; k < problem.num_points; ++k) {
-    const int32_t component = components.of_point[k];
-    if (component < 0 || problem.IsFixedPoint(k)) continue;
-    estimate->points[k] += moves[component].Shift(estimate->points[k]);
-  }
+  MoveComponents(problem, frames, components, moves, estimate);
 }
 
 void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
@@ -279,6 +340,27 @@ void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
   if (cost(moved) <= (1 + kErrorRounding) * cost(*estimate)) {
     *estimate = std::move(moved);
   }
+}
+
+void MoveToPlaces(const KnownRotationProblem& problem,
+                  const std::vector<WantedPlace>& places, Estimate* estimate) {
+  const Components components = FindComponents(problem);
+  const std::vector<FrameGeometry> frames = DescribeFrames(problem, {});
+  const std::vector<char> scale_is_free = ScaleIsFree(frames, components);
+  const std::vector<Hold> holds = FindHolds(problem, frames, components);
+  std::vector<std::vector<const WantedPlace*>> places_of(components.count);
+  for (const WantedPlace& place : places) {
+    const int32_t component = place.frame >= 0
+                                  ? components.of_frame[place.frame]
+                                  : components.of_point[place.point];
+    if (component >= 0) places_of[component].push_back(&place);
+  }
+  std::vector<Move> moves(components.count);
+  for (int32_t c = 0; c < components.count; ++c) {
+    if (holds[c].position || places_of[c].empty()) continue;
+    moves[c] = MoveTo(places_of[c], scale_is_free[c]);
+  }
+  MoveComponents(problem, frames, components, moves, estimate);
 }
 
 void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate) {

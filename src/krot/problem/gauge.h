@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -59,6 +60,22 @@ void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
                             const Estimate& reference, Norm norm,
                             const Context& context, Estimate* estimate,
                             const std::vector<char>* held = nullptr);
+
+// Where something of a frame, or else a point, is to be: |U (x - g)| <= 1.
+struct WantedPlace {
+  int32_t frame = -1;
+  int32_t point = -1;  // if frame is -1
+  Eigen::Vector3d x;
+  Eigen::Vector3d centre;           // g
+  Eigen::Matrix3d unit_from_world;  // U
+};
+
+// Moves each component in which nothing is fixed, and scales it if its scale is
+// free, so that the largest |U (x - g)| of its places becomes nearly the least,
+// by reweighted least squares [Lawson 1961]. Does not raise it. The cost does
+// not change. O(observations + places).
+void MoveToPlaces(const KnownRotationProblem& problem,
+                  const std::vector<WantedPlace>& places, Estimate* estimate);
 
 // Scales an estimate to a median depth of one. The problem must have no
 // baselines (HasBaseline), so that its scale is free. O(observations).
