@@ -81,8 +81,9 @@ struct BundleAdjustmentOptions {
   double parameter_tolerance = 0;          // relative; >= 0
 
   // Without a cap: the reduced camera system is solved by a dense factorisation
-  // up to the first number of images, by a sparse one up to the second, and by
-  // conjugate gradients above.
+  // up to the first number of images, and by conjugate gradients above the
+  // second; in between by what takes least, which is seldom conjugate
+  // gradients.
   int max_num_images_direct_dense = 50;     // >= 0
   int max_num_images_direct_sparse = 1000;  // >= 0
 

@@ -670,7 +670,12 @@ TEST(AdjustBundle, GivesTheSameBitsAgainOnOneThread) {
 }
 
 TEST(AdjustBundle, ReachesTheSameCostWithEveryLinearSolver) {
-  const Model model = SynthesizeScene(SmallOptions()).model;
+  SceneOptions scene = SmallOptions();
+  scene.layout = SceneLayout::kStreet;
+  scene.num_frames = 30;
+  scene.num_points = 300;
+  scene.track_length = 3;
+  const Model model = SynthesizeScene(scene).model;
   BundleAdjustmentOptions options = Exact();
   const BundleAdjustmentSummary dense =
       AdjustBundle(model, options, kAdjustAlone).summary;
@@ -685,6 +690,15 @@ TEST(AdjustBundle, ReachesTheSameCostWithEveryLinearSolver) {
   EXPECT_EQ(iterative.linear_solver, "iterative_schur");
   EXPECT_NEAR(sparse.cost_final, dense.cost_final, 1e-7 * dense.cost_final);
   EXPECT_NEAR(iterative.cost_final, dense.cost_final, 1e-5 * dense.cost_final);
+}
+
+TEST(AdjustBundle, SolvesADenseSystemWhereASparseFactorWouldBeFull) {
+  const Model model = SynthesizeScene(SmallOptions()).model;
+  BundleAdjustmentOptions options = Exact();
+  options.max_num_images_direct_dense = 0;
+  const BundleAdjustmentSummary summary =
+      AdjustBundle(model, options, kAdjustAlone).summary;
+  EXPECT_EQ(summary.linear_solver, "dense_schur");
 }
 
 TEST(AdjustBundle, StopsWhenCancelled) {

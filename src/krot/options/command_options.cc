@@ -124,8 +124,9 @@ void AdjustmentOptions::AddCeres(OptionTable* table) {
     table->AddInteger(
         group + kMoved[6], &options->max_num_images_direct_sparse, AtLeast(0),
         text(6,
-             "Up to so many images it is sparse; beyond, and where its factor "
-             "is nearly full, conjugate gradients solve it"));
+             "Up to so many images it is sparse, or dense where its factor is "
+             "nearly full; beyond, and where that takes longer, conjugate "
+             "gradients solve it"));
   }
   table->AddNamed<RobustLoss>("BundleAdjustmentCeres.loss_function_type",
                               &options->loss,
