@@ -701,6 +701,28 @@ TEST(AdjustBundle, SolvesADenseSystemWhereASparseFactorWouldBeFull) {
   EXPECT_EQ(summary.linear_solver, "dense_schur");
 }
 
+Model Enlarged(Model model, double factor) {
+  for (Point3D& point : model.points3D) point.xyz *= factor;
+  for (Frame& frame : model.frames) frame.rig_from_world.translation *= factor;
+  for (Image& image : model.images) image.cam_from_world.translation *= factor;
+  return model;
+}
+
+TEST(AdjustBundle, DoesNotDependOnTheUnitOfLength) {
+  const Model model = SynthesizeScene(SmallOptions()).model;
+  const BundleAdjustmentResult result =
+      AdjustBundle(model, Exact(), kAdjustAlone);
+  for (const double factor : {std::exp2(-30), std::exp2(30)}) {
+    SCOPED_TRACE(factor);
+    const BundleAdjustmentResult other =
+        AdjustBundle(Enlarged(model, factor), Exact(), kAdjustAlone);
+    EXPECT_EQ(other.summary.num_iterations, result.summary.num_iterations);
+    EXPECT_EQ(ModelComparison({}).FirstDifference(
+                  other.model, Enlarged(result.model, factor)),
+              "");
+  }
+}
+
 TEST(AdjustBundle, StopsWhenCancelled) {
   const Model model = SynthesizeScene(SmallOptions()).model;
   BundleAdjustmentOptions options = Exact();

@@ -341,6 +341,8 @@ BundleAdjustmentResult AdjustBundle(
       MakeAdjustmentBlocks(model, options.min_track_length, options.fixed);
   AdjustmentColumns columns(options, before);
   AddSurvey(model, options, &columns, &before);
+  const double unit = UnitOfLength(before, context);
+  DivideLengths(unit, &before);
   AdjustmentBlocks blocks = before;
 
   const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(options);
@@ -377,6 +379,8 @@ BundleAdjustmentResult AdjustBundle(
       blocks = std::move(restored);
     }
   }
+  DivideLengths(1 / unit, &before);
+  DivideLengths(1 / unit, &blocks);
   result.model = ApplyBlocks(model, before, blocks);
   if (precision != nullptr && summary.num_parameters > 0 && cost) {
     context.Stage("computing standard deviations and redundancy numbers");

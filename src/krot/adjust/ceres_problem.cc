@@ -1,6 +1,7 @@
 #include "krot/adjust/ceres_problem.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -12,6 +13,7 @@
 #include <Eigen/Geometry>
 
 #include "krot/adjust/adjustment_blocks.h"
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
 #include "krot/geometry.h"
@@ -273,6 +275,37 @@ ceres::Solver::Options AdjustmentSolverOptions(
   }
   solver.linear_solver_ordering = std::move(ordering);
   return solver;
+}
+
+double UnitOfLength(const AdjustmentBlocks& blocks, const Context& context) {
+  std::vector<double> distances;
+  int32_t point = -1;
+  for (const AdjustmentObservation& observation : blocks.observations) {
+    if (observation.point == point) continue;
+    point = observation.point;
+    distances.push_back(
+        (blocks.points[point] - CenterOf(blocks.frames[observation.frame]))
+            .norm());
+  }
+  const double median = distances.empty() ? 0 : MedianOf(distances, context);
+  return std::isnormal(median) ? std::exp2(std::ilogb(median)) : 1;
+}
+
+void DivideLengths(double unit, AdjustmentBlocks* blocks) {
+  const auto divide = [&](PoseBlock* pose) {
+    for (size_t i = 4; i < pose->size(); ++i) (*pose)[i] /= unit;
+  };
+  for (PoseBlock& frame : blocks->frames) divide(&frame);
+  for (PoseBlock& sensor : blocks->sensors) divide(&sensor);
+  for (Vector3d& point : blocks->points) point /= unit;
+  for (PositionObservation& position : blocks->positions) {
+    position.position /= unit;
+    position.px_from_world *= unit;
+  }
+  for (DistanceObservation& distance : blocks->distances) {
+    distance.length /= unit;
+    distance.px_from_world *= unit;
+  }
 }
 
 std::optional<double> Stationarity(int num_threads, double cost,

@@ -56,6 +56,13 @@ ceres::Solver::Options AdjustmentSolverOptions(
     const BundleAdjustmentOptions& options, const Context& context,
     AdjustmentBlocks* blocks, const ceres::Problem& problem);
 
+// A power of two near the median distance of points from their first frames,
+// and all lengths of `blocks` divided by it, exactly. Ceres adds at least 1e-6
+// over the radius to the diagonal of J'J, which is little only where lengths
+// are neither tiny nor huge.
+double UnitOfLength(const AdjustmentBlocks& blocks, const Context& context);
+void DivideLengths(double unit, AdjustmentBlocks* blocks);
+
 // g' D^-1 g / (2 cost), with the loss: g is the gradient of the cost by the
 // unknowns that move, and D the diagonal of J'J, so that g_j^2 / (2 D_j) is the
 // gain of moving unknown j alone, to first order. 0 at a stationary point and
