@@ -340,8 +340,8 @@ struct ModelCheck {
   // of an image's noise, and most points where these see them. If not, adjust
   // the model first; no image is called misplaced.
   bool is_adjusted = true;
-  // Whether sigma_px is within the 4 px of COLMAP's filter or a hundredth of
-  // the photos' size. If not, nothing else that is said counts.
+  // Whether sigma_px is within COLMAP's 4 px or a hundredth of the photos'
+  // size. If not, nothing else that is said counts.
   bool fits = true;
   // Observations and images may look wrong only because of them: adjust the
   // model with what is wrong free, and check it again. The largest gain first.
@@ -352,13 +352,14 @@ struct ModelCheck {
   std::vector<WrongObservation> observations;
   std::vector<TwoPointTrack> tracks;
   std::vector<ModelPart> parts;  // the most images first
-  // 3D points of an adjusted model that are far from where their observations,
+  // Points of an adjusted model that are far from where their observations,
   // none of which is wrong, see them: in Model::points3D.
   std::vector<int32_t> misplaced_points;
-  // Pairs of images that are the same photo, as they see most of their points
-  // at the same pixels: in `images`. Their observations count twice.
+  // The same, of points at one pixel of images that turn. No camera is judged.
+  std::vector<int32_t> still_points;
+  // Pairs in `images` that see most of their points at the same pixels.
   std::vector<std::array<int32_t, 2>> same_photos;
-  // Positions of the points without wrong observations, as Model::points3D.
+  // The points' places without wrong observations, as Model::points3D.
   std::vector<Eigen::Vector3d> points;
 
   int64_t NumImages(ImageVerdict verdict) const;
@@ -366,7 +367,7 @@ struct ModelCheck {
   bool IsAnythingWrong() const {
     return conventions || !fits || ErrorsAgree() || !observations.empty() ||
            !cameras.empty() || !misplaced_points.empty() ||
-           NumImages(ImageVerdict::kWrong) > 0 ||
+           !still_points.empty() || NumImages(ImageVerdict::kWrong) > 0 ||
            (pairs && pairs->IsAnythingWrong());
   }
 };
@@ -374,11 +375,11 @@ struct ModelCheck {
 // Finds what is wrong in a model (docs/method/outliers.md). A model in other
 // conventions is converted to COLMAP's. Then the images go that the database's
 // matches call wrong, and in each track the observation with the largest w,
-// until none is above the critical value. The image with the strongest evidence
-// against it is called wrong if one of the tests of ImageFault says so; over
-// all images of a sound model the probability of that is false_alarm. All this
-// is repeated without the image, so that none is blamed for its neighbour.
-// Requires a valid model. The same bits at any number of threads.
+// until none is critical. The image with the strongest evidence against it is
+// called wrong if one of the tests of ImageFault says so; over all images of a
+// sound model the probability of that is false_alarm. All this is repeated
+// without the image, so that none is blamed for its neighbour. Requires a valid
+// model. The same bits at any number of threads.
 ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options = {},
                       const Context& context = {});
 

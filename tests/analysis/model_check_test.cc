@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
+#include <optional>
 #include <random>
 #include <set>
 #include <utility>
@@ -660,6 +662,50 @@ TEST(CheckModel, NamesPairsOfImagesThatAreTheSamePhoto) {
   const ModelCheck check = CheckModel(copy);
   EXPECT_THAT(check.same_photos, ElementsAre(std::array<int32_t, 2>{3, 5}));
   EXPECT_EQ(check.NumImages(ImageVerdict::kWrong), 0);
+}
+
+// A hood or a time stamp: all images of the first points see them at the same
+// pixels, to half a pixel.
+Model WithHood(const Model& sound, size_t num_points) {
+  Model model = sound;
+  std::mt19937 generator(1);
+  std::uniform_real_distribution<double> uniform(-0.5, 0.5);
+  const IdIndex<ImageId> image_of(model.images);
+  for (size_t k = 0; k < num_points; ++k) {
+    const Point3D& point = model.points3D[k];
+    std::optional<Point2D> first;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model.track_elements[e];
+      Point2D& pixel = model.images[*image_of.Find(element.image_id)]
+                           .points2D[element.point2D_idx];
+      if (!first) first = pixel;
+      pixel.x = first->x + uniform(generator);
+      pixel.y = first->y + uniform(generator);
+    }
+  }
+  return model;
+}
+
+TEST(CheckModel, NamesWhatStaysAtItsPixelsWhileCamerasTurn) {
+  const Model sound = Scene(1);
+  EXPECT_THAT(CheckModel(sound).still_points, IsEmpty());
+  const Model model = WithHood(sound, 30);
+  const ModelCheck check = CheckModel(model);
+  std::vector<int32_t> expected(30);
+  std::iota(expected.begin(), expected.end(), 0);
+  EXPECT_EQ(check.still_points, expected);
+  EXPECT_TRUE(check.IsAnythingWrong());
+  EXPECT_THAT(check.cameras, IsEmpty());
+  const Model cured = CureModel(model, check).model;
+  EXPECT_EQ(cured.points3D.size(), sound.points3D.size() - 30);
+}
+
+TEST(CheckModel, TakesWhatStaysForDistantWhereCamerasDoNotTurn) {
+  Model model = WithHood(Scene(1), 30);
+  for (Frame& frame : model.frames) {
+    frame.rig_from_world.quaternion_wxyz = {1, 0, 0, 0};
+  }
+  EXPECT_THAT(CheckModel(model).still_points, IsEmpty());
 }
 
 TEST(CheckModel, FindsImagesThatAreFarOffAmongAQuarterOfAll) {

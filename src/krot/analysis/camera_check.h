@@ -186,4 +186,10 @@ std::vector<WrongCamera> FindWrongCameras(const Model& model,
 // that is no chance. Requires the images' verdicts. O(images).
 void AddCamerasOfWrongImages(const Model& model, ModelCheck* check);
 
+// As ModelCheck::still_points. O(observations).
+std::vector<int32_t> FindStillPoints(const Model& model);
+
+// As ModelCheck::same_photos. O(observations log(longest track)).
+std::vector<std::array<int32_t, 2>> FindSamePhotos(const Model& model);
+
 }  // namespace krot::internal

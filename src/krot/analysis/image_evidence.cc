@@ -1,8 +1,11 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -11,6 +14,7 @@
 
 #include "krot/analysis/camera_check.h"
 #include "krot/base/numbers.h"
+#include "krot/camera/camera_model.h"
 #include "krot/linear/blocks.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
@@ -27,6 +31,8 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 // For smaller lambda the density is nearly even, and a series replaces formulas
 // that would lose digits.
 constexpr double kFlat = 1e-4;
+// So many points may be seen at the same pixels by chance.
+constexpr size_t kChancePoints = 15;
 
 // The mean of the density lambda exp(-lambda u) / (1 - exp(-lambda)) on [0, 1].
 double MeanInDisc(double lambda) {
@@ -49,6 +55,50 @@ double LogFactorOnSegment(double lambda) {
 double MeanOnSegment(double lambda) {
   if (lambda < kFlat) return 1.0 / 3 - 4.0 / 45 * lambda;
   return (1 - std::exp(LogFactorOnSegment(lambda) - lambda)) / (2 * lambda);
+}
+
+// How far, RMS, the pixels that see a point are from their mean; infinite where
+// fewer than three images see it, and where their cameras turn so little that a
+// distant point would be seen at one pixel up to `moved_px`.
+double RmsIfStill(const Model& model,
+                  const std::vector<ImageGeometry>& geometries,
+                  const std::vector<int32_t>& image_of, const Point3D& point,
+                  double moved_px) {
+  std::vector<int32_t> images;
+  Vector2d mean = Vector2d::Zero();
+  const auto pixel_of = [&](uint64_t e) {
+    const Point2D& pixel =
+        model.images[image_of[e]].points2D[model.track_elements[e].point2D_idx];
+    return Vector2d(pixel.x, pixel.y);
+  };
+  for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+    images.push_back(image_of[e]);
+    mean += pixel_of(e);
+  }
+  const auto count = static_cast<double>(images.size());
+  mean /= count;
+  std::sort(images.begin(), images.end());
+  images.erase(std::unique(images.begin(), images.end()), images.end());
+  double sum = 0;
+  for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+    sum += (pixel_of(e) - mean).squaredNorm();
+  }
+  const double rms = std::sqrt(sum / count);
+  if (images.size() < 3 || rms > moved_px) return kInfinity;
+  std::optional<Vector3d> first;
+  for (const int32_t n : images) {
+    const ImageGeometry& geometry = geometries[n];
+    if (!geometry.has_pose) continue;
+    const Camera& camera = model.cameras[geometry.camera];
+    const auto ray = PixelBearing(camera, mean);
+    const auto beside = PixelBearing(camera, mean + Vector2d(moved_px, 0));
+    if (!ray || !beside) continue;
+    const Vector3d in_world =
+        geometry.cam_from_world.rotation.transpose() * *ray;
+    if (!first) first = in_world;
+    if ((in_world - *first).norm() > (*ray - *beside).norm()) return rms;
+  }
+  return kInfinity;
 }
 
 }  // namespace
@@ -290,6 +340,59 @@ double ErrorCorrelation(const Model& model, const ModelNoise& noise) {
     }
   }
   return squares > 0 ? products / squares - 3 / std::sqrt(num) : 0;
+}
+
+// What moves passes through any distance: points that stay within a pixel are
+// no chance where they are more than those within the next one.
+std::vector<int32_t> FindStillPoints(const Model& model) {
+  constexpr double kStillPx = 1;
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
+  std::vector<int32_t> still;
+  size_t num_near = 0;
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    const double rms = RmsIfStill(model, geometries, image_of,
+                                  model.points3D[k], 2 * kStillPx);
+    if (rms <= kStillPx) {
+      still.push_back(static_cast<int32_t>(k));
+    } else {
+      num_near += rms <= 2 * kStillPx;
+    }
+  }
+  if (still.size() <= kChancePoints + 2 * num_near) still.clear();
+  return still;
+}
+
+std::vector<std::array<int32_t, 2>> FindSamePhotos(const Model& model) {
+  const std::vector<int32_t> image_of = ImagesOfElements(model);
+  std::vector<int64_t> num_observations(model.images.size(), 0);
+  std::map<std::array<int32_t, 2>, int64_t> num_same;
+  std::vector<std::tuple<double, double, int32_t>> sights;  // x, y, image
+  for (const Point3D& point : model.points3D) {
+    sights.clear();
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const int32_t n = image_of[e];
+      const uint32_t i = model.track_elements[e].point2D_idx;
+      const Point2D& pixel = model.images[n].points2D[i];
+      sights.emplace_back(pixel.x, pixel.y, n);
+      ++num_observations[n];
+    }
+    std::sort(sights.begin(), sights.end());
+    for (size_t j = 1; j < sights.size(); ++j) {
+      const auto& [x1, y1, image1] = sights[j - 1];
+      const auto& [x2, y2, image2] = sights[j];
+      if (x1 == x2 && y1 == y2 && image1 != image2)
+        ++num_same[{image1, image2}];
+    }
+  }
+  std::vector<std::array<int32_t, 2>> same;
+  for (const auto& [images, num] : num_same) {
+    const int64_t fewer =
+        std::min(num_observations[images[0]], num_observations[images[1]]);
+    // A few pixels agree by chance where they are rounded.
+    if (num > int64_t{kChancePoints} && 2 * num > fewer) same.push_back(images);
+  }
+  return same;
 }
 
 }  // namespace krot::internal

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/analysis/camera_check.h"
 #include "krot/analysis/model_input.h"
 #include "krot/analysis/noise.h"
 #include "krot/camera/camera_model.h"
@@ -254,6 +255,11 @@ std::vector<char> WrongElements(const Model& model, const ModelCheck& check) {
   for (const WrongObservation& one : check.observations) {
     is_wrong[one.element] = 1;
   }
+  for (const int32_t k : check.still_points) {
+    const Point3D& point = model.points3D[k];
+    std::fill(is_wrong.begin() + static_cast<int64_t>(point.track_begin),
+              is_wrong.begin() + static_cast<int64_t>(point.track_end), 1);
+  }
   return is_wrong;
 }
 
@@ -335,6 +341,7 @@ ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
   const Model& read = converted ? *converted : model;
   ModelCheck check = CheckConverted(read, options, context);
   check.conventions = conventions;
+  check.still_points = FindStillPoints(read);
   for (WrongCamera& wrong : check.cameras) {
     if (wrong.fault != CameraFault::kFocalLength) continue;
     const Camera& camera =
@@ -354,7 +361,12 @@ ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
       check.is_adjusted = false;
     }
   }
-  check.same_photos = FindSamePhotos(model);
+  // Such points look like a wrong lens or the same photo.
+  if (!check.still_points.empty()) {
+    check.cameras.clear();
+  } else {
+    check.same_photos = FindSamePhotos(model);
+  }
   return check;
 }
 

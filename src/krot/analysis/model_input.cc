@@ -4,11 +4,9 @@
 #include <array>
 #include <cmath>
 #include <iomanip>
-#include <map>
 #include <optional>
 #include <sstream>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -328,38 +326,6 @@ KnownPositions ReadKnownPositions(const PositionFiles& files,
       files.of_cameras.empty() ? files.of_points : files.of_cameras);
   known.positions = known.frame->positions;
   return known;
-}
-
-std::vector<std::array<int32_t, 2>> FindSamePhotos(const Model& model) {
-  const std::vector<int32_t> image_of = ImagesOfElements(model);
-  std::vector<int64_t> num_observations(model.images.size(), 0);
-  std::map<std::array<int32_t, 2>, int64_t> num_same;
-  std::vector<std::tuple<double, double, int32_t>> sights;  // x, y, image
-  for (const Point3D& point : model.points3D) {
-    sights.clear();
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      const int32_t n = image_of[e];
-      const uint32_t i = model.track_elements[e].point2D_idx;
-      const Point2D& pixel = model.images[n].points2D[i];
-      sights.emplace_back(pixel.x, pixel.y, n);
-      ++num_observations[n];
-    }
-    std::sort(sights.begin(), sights.end());
-    for (size_t j = 1; j < sights.size(); ++j) {
-      const auto& [x1, y1, image1] = sights[j - 1];
-      const auto& [x2, y2, image2] = sights[j];
-      if (x1 == x2 && y1 == y2 && image1 != image2)
-        ++num_same[{image1, image2}];
-    }
-  }
-  std::vector<std::array<int32_t, 2>> same;
-  for (const auto& [images, num] : num_same) {
-    const int64_t fewer =
-        std::min(num_observations[images[0]], num_observations[images[1]]);
-    // A few pixels agree by chance where they are rounded.
-    if (num > 15 && 2 * num > fewer) same.push_back(images);
-  }
-  return same;
 }
 
 }  // namespace krot::internal

@@ -35,9 +35,6 @@ namespace krot::internal {
 Contradictions SettleContradictions(const std::string& on_contradiction,
                                     Model* model);
 
-// As ModelCheck::same_photos. O(observations log(longest track)).
-std::vector<std::array<int32_t, 2>> FindSamePhotos(const Model& model);
-
 // Whether a change of positions made the images' side of a model worse that
 // contradicts itself: its largest errors before and after, pixels in the
 // p-norm. None if it did not, if that side did not fit before (by its median,

@@ -116,6 +116,7 @@ std::string NextSteps(const CheckReport& report) {
         (report.database_path.empty() ? "" : " --database_path " + database) +
         " --output_path " + cured + "\n";
   }
+  if (!check.still_points.empty()) return text + MaskSteps(images);
   if (NeedsOtherCameras(check) || check.ErrorsAgree()) {
     return text + OtherCameraSteps(check, input, images);
   }
@@ -329,6 +330,7 @@ std::string ForAdjusted(const CheckReport& report) {
 std::string ConvertedSentence(const CheckReport& report) {
   const ModelCheck& check = report.check;
   const bool is_camera = !check.cameras.empty();
+  if (!check.still_points.empty()) return StillPointsSentence(check);
   if (!check.fits && !is_camera) {
     return (check.is_adjusted
                 ? "The observations do not fit the model: errors are "

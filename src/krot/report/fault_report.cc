@@ -109,6 +109,22 @@ std::string NotJudgedSentence(const ModelCheck& check) {
           " cannot be checked (" + ListText(std::move(names), 5) + ").\n");
 }
 
+std::string StillPointsSentence(const ModelCheck& check) {
+  return Counted(check.still_points.size(), "3D point", "stays", "stay") +
+         " at the same pixels while the cameras turn, as what a hood, a time "
+         "stamp or the background of a turntable shows does: they bend the "
+         "model.";
+}
+
+std::string MaskSteps(const std::string& images) {
+  return "  Make MASK.png, as large as the photos and black where they show "
+         "what stays, and extract\n  features in a new database; then match "
+         "and map anew:\n    colmap feature_extractor "
+         "--ImageReader.camera_mask_path MASK.png --database_path NEW_DATABASE "
+         "--image_path " +
+         images + "\n";
+}
+
 std::string SamePhotosSentence(const ModelCheck& check) {
   if (check.same_photos.empty()) return "";
   const auto [first, second] = check.same_photos.front();
@@ -251,6 +267,7 @@ std::string CheckJson(const CheckReport& report) {
       {"is_adjusted", check.is_adjusted},
       {"fits", check.fits},
       {"num_misplaced_points", check.misplaced_points.size()},
+      {"num_still_points", check.still_points.size()},
       {"conventions", JsonIf(check.conventions, ConventionsJson)},
       {"num_images", check.images.size()},
       {"num_wrong_images", check.NumImages(ImageVerdict::kWrong)},

@@ -55,6 +55,10 @@ std::string DiscardedSentence(const std::vector<DiscardedCamera>& discarded);
 std::string NotJudgedSentence(const ModelCheck& check);
 std::string SamePhotosSentence(const ModelCheck& check);
 
+// Requires still points. What then comes next, for photos at this path.
+std::string StillPointsSentence(const ModelCheck& check);
+std::string MaskSteps(const std::string& images);
+
 // Whether a camera is wrong in a way that no adjustment mends: in its model, or
 // in what shares it. What then comes next, in commands of COLMAP and KROT, with
 // these paths.
