@@ -337,8 +337,7 @@ struct ModelCheck {
   // Up to 0.33 for sound cameras in real models, 0.42 for wrongly shared ones.
   double error_correlation = 0;
   // Whether most images stand where their own errors would put them, up to half
-  // of an image's noise, and most points where these see them. If not, adjust
-  // the model first; no image is called misplaced.
+  // an image's noise, and most points where these see them. Else adjust first.
   bool is_adjusted = true;
   // Whether sigma_px is within COLMAP's 4 px or a hundredth of the photos'
   // size. If not, nothing else that is said counts.
