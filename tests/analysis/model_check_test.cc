@@ -690,14 +690,20 @@ TEST(CheckModel, NamesWhatStaysAtItsPixelsWhileCamerasTurn) {
   const Model sound = Scene(1);
   EXPECT_THAT(CheckModel(sound).still_points, IsEmpty());
   const Model model = WithHood(sound, 30);
+  std::vector<int32_t> of_three;
+  for (int32_t k = 0; k < 30; ++k) {
+    const Point3D& point = sound.points3D[k];
+    if (point.track_end - point.track_begin > 2) of_three.push_back(k);
+  }
   const ModelCheck check = CheckModel(model);
-  std::vector<int32_t> expected(30);
-  std::iota(expected.begin(), expected.end(), 0);
-  EXPECT_EQ(check.still_points, expected);
+  EXPECT_EQ(check.still_points, of_three);
   EXPECT_TRUE(check.IsAnythingWrong());
   EXPECT_THAT(check.cameras, IsEmpty());
   const Model cured = CureModel(model, check).model;
-  EXPECT_EQ(cured.points3D.size(), sound.points3D.size() - 30);
+  const IdIndex<Point3DId> cured_points(cured.points3D);
+  for (const int32_t k : of_three) {
+    EXPECT_FALSE(cured_points.Find(model.points3D[k].id));
+  }
 }
 
 TEST(CheckModel, TakesWhatStaysForDistantWhereCamerasDoNotTurn) {

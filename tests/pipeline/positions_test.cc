@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "krot/camera/camera_model.h"
@@ -25,12 +26,15 @@
 #include "krot/pipeline/solve_model.h"
 #include "krot/pipeline/stages.h"
 #include "krot/synthetic/scene.h"
+#include "tests/convert/lens_model.h"
+#include "tests/testing/model_matchers.h"
 #include "tests/testing/scene_of.h"
 
 namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
+using ::testing::AnyOf;
 
 using Of = KnownPosition::Of;
 
@@ -284,6 +288,47 @@ TEST(Positions, ThatHoldNothingBackLeaveTheOptimum) {
   ExpectProved(model, result, positions);
   EXPECT_LE(*result.summary.lower_bound, free.summary.LowestCost());
   EXPECT_LE(*free.summary.lower_bound, result.summary.LowestCost());
+}
+
+TEST(Positions, OfOneOrTwoCamerasMoveTheModelThere) {
+  const Model model = SynthesizeScene(Options()).model;
+  const SolveModelResult free = SolveWith(model, {});
+  for (const int count : {1, 2}) {
+    SCOPED_TRACE(count);
+    std::vector<KnownPosition> positions;
+    for (int32_t n = 0; n < count; ++n) {
+      positions.push_back(
+          {Of::kImage, n,
+           BallAround(Vector3d(70, -40, 90) + 25 * CentreOf(model, n), 1)});
+    }
+    const SolveModelResult result = SolveWith(model, positions);
+    ExpectProved(model, result, positions);
+    EXPECT_EQ(result.summary.init, SolveInit::kModel);
+    EXPECT_EQ(result.summary.num_observations, free.summary.num_observations);
+    EXPECT_LE(*result.summary.lower_bound, free.summary.LowestCost());
+    EXPECT_LE(*free.summary.lower_bound, result.summary.LowestCost());
+  }
+}
+
+TEST(Positions, ThatAllowOnlyUselessErrorsLeaveTheModel) {
+  LensModelOptions lens;
+  lens.num_points = 40;
+  const Model model = MakeLensModel(lens);
+  std::vector<KnownPosition> positions;
+  for (int32_t n = 0; n < 3; ++n) {
+    const Vector3d off = 20 * (n - 1) * Vector3d(1, n, 2 * n - 1);
+    positions.push_back(
+        {Of::kImage, n, BallAround(CentreOf(model, n) + off, 0.01)});
+  }
+  for (const SolveMethod method : {SolveMethod::kAuto, SolveMethod::kJoint}) {
+    SolveModelOptions options;
+    options.method = method;
+    options.problem.positions = positions;
+    const SolveModelResult result = SolveModel(model, options, {1});
+    EXPECT_THAT(result.summary.termination, AnyOf(SolveTermination::kInfeasible,
+                                                  SolveTermination::kNoStart));
+    EXPECT_EQ(ModelComparison({}).FirstDifference(result.model, model), "");
+  }
 }
 
 // The gauge, which observations leave free, drifts out of regions that hold

@@ -178,6 +178,7 @@ std::string PositionsConflictWords(const SolveSummary& summary) {
   if (positions.size() > kMost) {
     names += " and " + std::to_string(positions.size() - kMost) + " others";
   }
+  if (summary.support.empty()) return "";  // nothing is proved
   return positions.empty()
              ? "; no position is part of the conflict"
              : "; in conflict are the positions of " + names + " and " +

@@ -141,6 +141,32 @@ Estimate BestPointsOnSegments(const Reprojection& reprojection,
   return best;
 }
 
+void MoveInside(const BuiltProblem& built, Estimate* estimate) {
+  KnownRotationProblem of_model = built.problem;
+  of_model.observations.clear();
+  for (size_t i = 0; i < built.problem.observations.size(); ++i) {
+    if (!built.HasPixel(static_cast<int64_t>(i))) continue;
+    of_model.observations.push_back(built.problem.observations[i]);
+  }
+  IndexObservations(&of_model);
+  std::vector<WantedPlace> places;
+  for (const BuiltPosition& position : built.positions) {
+    WantedPlace place;
+    place.centre = position.region.centre;
+    place.unit_from_world = position.unit_from_world;
+    const Vector3d offset = OffsetOf(built, *estimate, position);
+    if (position.of == KnownPosition::Of::kImage) {
+      place.frame = built.problem.views[position.index].frame;
+      place.x = place.centre + offset;
+    } else {
+      place.point = position.index;
+      place.x = place.centre - offset;
+    }
+    places.push_back(place);
+  }
+  MoveToPlaces(of_model, places, estimate);
+}
+
 KeptPositions::KeptPositions(const Model& model,
                              const SolveModelOptions& options,
                              const Context& context,
@@ -208,32 +234,6 @@ void KeptPositions::Keep(const Estimate& estimate) {
   if (!(cost < cost_)) return;
   estimate_ = estimate;
   cost_ = cost;
-}
-
-void KeptPositions::MoveInside(Estimate* estimate) const {
-  KnownRotationProblem of_model = built_.problem;
-  of_model.observations.clear();
-  for (size_t i = 0; i < built_.problem.observations.size(); ++i) {
-    if (!reprojection_.IsOfModel(static_cast<int64_t>(i))) continue;
-    of_model.observations.push_back(built_.problem.observations[i]);
-  }
-  IndexObservations(&of_model);
-  std::vector<WantedPlace> places;
-  for (const BuiltPosition& position : built_.positions) {
-    WantedPlace place;
-    place.centre = position.region.centre;
-    place.unit_from_world = position.unit_from_world;
-    const Vector3d offset = OffsetOf(built_, *estimate, position);
-    if (position.of == KnownPosition::Of::kImage) {
-      place.frame = built_.problem.views[position.index].frame;
-      place.x = place.centre + offset;
-    } else {
-      place.point = position.index;
-      place.x = place.centre - offset;
-    }
-    places.push_back(place);
-  }
-  MoveToPlaces(of_model, places, estimate);
 }
 
 bool KeptPositions::TakeLevel(const Estimate& estimate, double optimum,

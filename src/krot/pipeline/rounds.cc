@@ -183,12 +183,14 @@ class Rounds {
       estimate_ = BestOnSegment(reprojection_, from, solved, options_.norm,
                                 context_, &round.step);
       if (round.step < 1 && positions_.Any()) {
-        positions_.MoveInside(&solved);
+        // The three cones of a position leave gaps around its region, into
+        // which the free shift and scale of a solve may drift.
+        MoveInside(built_, &solved);
         TakeUnlessHeldBack(solved, &round.step);
       }
       // Sweeps may have solved the rows, too, nearer to where these were taken.
       if (round.step < 1 && swept) {
-        positions_.MoveInside(&*swept);
+        MoveInside(built_, &*swept);
         if (bounds_.IsWorthProving(LevelledCost(*swept))) {
           TakeUnlessHeldBack(*swept, &round.step);
         }

@@ -116,6 +116,10 @@ Estimate BestPointsOnSegments(const Reprojection& reprojection,
 // strictly inside its constraints.
 inline constexpr double kKeptInRounds = kKeptPosition / 2;
 
+// Moves the estimate as a whole to where it keeps known positions best.
+// O(observations).
+void MoveInside(const BuiltProblem& built, Estimate* estimate);
+
 // The additional work of rounds where positions are known (reprojection.h):
 // finding the level, remembering the best estimate that keeps all positions,
 // and trying proofs at levels below the cost that was reached.
@@ -139,11 +143,6 @@ class KeptPositions {
   const Estimate& estimate() const { return estimate_; }
   // Remembers the estimate if it keeps all positions and is the best so far.
   void Keep(const Estimate& estimate);
-
-  // Moves the estimate as a whole to where it keeps the positions best. The
-  // three cones of a position leave gaps outside its region into which a
-  // solve's free shift and scale may drift.
-  void MoveInside(Estimate* estimate) const;
 
   // Call it after a round whose rows' optimum was `optimum` and that ended at
   // `estimate` with a levelled cost of `cost`. `is_held_back` says whether the

@@ -275,20 +275,19 @@ SolveModelResult SolveInFrame(const Model& model,
   summary.pixel_error_after = summary.pixel_error_before;
   summary.seconds_build = build_timer.Seconds();
   if (options.on_built) options.on_built(summary);
-  if (summary.num_observations + summary.num_positions == 0) {
-    summary.termination = SolveTermination::kNothingToSolve;
-    result.model = model;
-    return result;
-  }
-
   const Timer solve_timer;
   const SolveRun run{model, options, summary.method, context, solve_timer};
-  Estimate estimate;
-  if (!FindEstimate(run, &start, &estimate, &summary)) {
+  const auto end_without = [&] {
     summary.seconds_solve = solve_timer.Seconds();
     result.model = model;
     return result;
+  };
+  if (summary.num_observations + summary.num_positions == 0) {
+    summary.termination = SolveTermination::kNothingToSolve;
+    return end_without();
   }
+  Estimate estimate;
+  if (!FindEstimate(run, &start, &estimate, &summary)) return end_without();
   std::optional<PixelCertificate> certificate;
   if (!IsFinishEnough(run, estimate, &start.built, &summary)) {
     certificate = SolveInRounds(run, &start.built, &estimate, &summary);
@@ -300,9 +299,7 @@ SolveModelResult SolveInFrame(const Model& model,
   if (summary.termination == SolveTermination::kInfeasible) {
     Certify(model, start.built, estimate, options, context, certificate,
             &summary);
-    summary.seconds_solve = solve_timer.Seconds();
-    result.model = model;
-    return result;
+    return end_without();
   }
   if (summary.method == SolveMethod::kAuto &&
       summary.termination != SolveTermination::kInterrupted) {
@@ -344,8 +341,13 @@ SolveModelResult SolveInFrame(const Model& model,
     const auto worse = WorseImagesSide(model, result.model, options.norm);
     if (worse && worse->second > allowed) summary.worse_images_side = worse;
   }
-  // Where positions are known, the input need not keep them, so its lower
-  // errors do not count.
+  // Known positions may raise errors above the input's, but not without bound.
+  if (!start.built.positions.empty() && !context.IsCancelled() &&
+      IsWorse(Counted(roles, before_px), Counted(roles, after_px),
+              std::max(allowed, options.init_max_error), context)) {
+    summary.termination = SolveTermination::kNoStart;
+    return end_without();
+  }
   if (start.built.positions.empty() &&
       (summary.collapse.IsWhole() || summary.worse_images_side ||
        IsWorse(Counted(roles, before_px), Counted(roles, after_px), allowed,

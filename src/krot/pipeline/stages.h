@@ -58,7 +58,8 @@ JointCallback LogIterations(const JointCallback& callback, const Timer& timer,
 // Where a solve starts.
 struct Start {
   // Has all observations that can take part from this start. built.start are
-  // the model's own positions, also the reference for the coordinate frame.
+  // the model's own positions, moved as a whole to where cameras are known to
+  // be; also the reference for the coordinate frame.
   BuiltProblem built;
   SolveInit init = SolveInit::kModel;
 };

@@ -9,6 +9,7 @@
 #include "krot/geometry.h"
 #include "krot/joint/component_solve.h"
 #include "krot/joint/joint.h"
+#include "krot/pipeline/rounds.h"
 
 namespace krot::internal {
 
@@ -80,8 +81,13 @@ bool HasOwnStart(const BuiltProblem& own) {
 
 Start OwnStart(const Model& model, const SolveModelOptions& options,
                const Context& context) {
-  return {Build(model, options, context, /*ignore_translations=*/false),
-          SolveInit::kModel};
+  Start start{Build(model, options, context, /*ignore_translations=*/false),
+              SolveInit::kModel};
+  BuiltProblem& built = start.built;
+  if (LargestPositionRatio(built, built.start) > 1) {
+    MoveInside(built, &built.start);
+  }
+  return start;
 }
 
 Start ChooseStart(const Model& model, const SolveModelOptions& options,
