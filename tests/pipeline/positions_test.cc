@@ -340,7 +340,7 @@ TEST(Positions, ThatHoldNothingBackLeaveTheOptimumOfARealModel) {
       std::filesystem::path(root) / "drone72_rig";
   const Model model = ReadModel(folder, DetectModelFormat(folder));
   const SolveModelResult free = SolveWith(model, {});
-  for (const double radius : {0.01, 0.1}) {
+  for (const double radius : {0.01, 0.1, 1.0}) {
     SCOPED_TRACE(radius);
     const std::vector<KnownPosition> positions =
         Positions(model, radius, 0.2, 1);

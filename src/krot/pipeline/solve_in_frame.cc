@@ -292,7 +292,7 @@ SolveModelResult SolveInFrame(const Model& model,
   if (!IsFinishEnough(run, estimate, &start.built, &summary)) {
     certificate = SolveInRounds(run, &start.built, &estimate, &summary);
     if (summary.method == SolveMethod::kAuto && context.ranks == nullptr &&
-        options.problem.positions.empty() && HasJointSolver(options.norm)) {
+        HasJointSolver(options.norm)) {
       TryOtherWays(run, &start, &estimate, &certificate, &summary);
     }
   }

@@ -246,7 +246,15 @@ void TryOtherWays(const SolveRun& run, Start* start, Estimate* estimate,
     if (found) {
       std::optional<PixelCertificate> proof =
           SolveInRounds(other_run, &other.built, &*found, &way);
-      if (way.cost_final < summary->cost_final) {
+      // An estimate that keeps known positions is better than one that does
+      // not.
+      const auto how_bad = [](const BuiltProblem& built, const Estimate& x,
+                              double cost) {
+        return std::pair(LargestPositionRatio(built, x) > 1 + kKeptPosition,
+                         cost);
+      };
+      if (how_bad(other.built, *found, way.cost_final) <
+          how_bad(start->built, *estimate, summary->cost_final)) {
         *start = std::move(other);
         summary->init = start->init;
         *estimate = *std::move(found);
