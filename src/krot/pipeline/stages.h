@@ -62,6 +62,9 @@ struct Start {
   // be; also the reference for the coordinate frame.
   BuiltProblem built;
   SolveInit init = SolveInit::kModel;
+  // Whether that move has raised errors: those of points in cameras, whose
+  // depths are a few digits.
+  bool has_lost_digits = false;
 };
 
 // Decides where to start, and notes it: from the model's own estimate or, if

@@ -10,6 +10,7 @@
 #include "krot/joint/component_solve.h"
 #include "krot/joint/joint.h"
 #include "krot/pipeline/rounds.h"
+#include "krot/problem/cost.h"
 
 namespace krot::internal {
 
@@ -84,9 +85,15 @@ Start OwnStart(const Model& model, const SolveModelOptions& options,
   Start start{Build(model, options, context, /*ignore_translations=*/false),
               SolveInit::kModel};
   BuiltProblem& built = start.built;
-  if (LargestPositionRatio(built, built.start) > 1) {
-    MoveInside(built, &built.start);
-  }
+  if (!(LargestPositionRatio(built, built.start) > 1)) return start;
+  const Reprojection reprojection(model, built);
+  const auto cost = [&] {
+    return reprojection.TrueCost(built.start, options.norm,
+                                 context.num_threads);
+  };
+  const double before = cost();
+  MoveInside(built, &built.start);
+  start.has_lost_digits = cost() > (1 + kErrorRounding) * before;
   return start;
 }
 
@@ -99,7 +106,8 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
   const bool coincide = CentresCoincide(own.built);
   const bool asked = options.init == SolveInit::kFeasible;
   const bool is_far =
-      !coincide && IsFarFromPositions(model, own.built, options, context);
+      !coincide && (own.has_lost_digits ||
+                    IsFarFromPositions(model, own.built, options, context));
   if (!asked && !coincide && !is_far && count(LeftOut::kBehind) == 0 &&
       count(LeftOut::kNoPose) == 0) {
     return own;
@@ -109,14 +117,15 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
   Start all{Build(model, options, context, /*ignore_translations=*/true),
             SolveInit::kFeasible};
   if (asked) return all;
+  const int64_t num_missing =
+      NumObservations(all.built, context) - NumObservations(own.built, context);
+  if (own.has_lost_digits && num_missing < 0) return own;
   if (is_far) {
     context.Note(
         "the model's cameras are far from their positions; looking for a start "
         "that is not");
     return all;
   }
-  const int64_t num_missing =
-      NumObservations(all.built, context) - NumObservations(own.built, context);
   const bool is_larger = num_missing > 0;
   if (!is_larger && !coincide) return own;
   if (method != SolveMethod::kAuto) {
