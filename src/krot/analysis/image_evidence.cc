@@ -342,8 +342,8 @@ double ErrorCorrelation(const Model& model, const ModelNoise& noise) {
   return squares > 0 ? products / squares - 3 / std::sqrt(num) : 0;
 }
 
-// What moves passes through any distance: points that stay within a pixel are
-// no chance where they are more than those within the next one.
+// Points that hardly move by chance are as often within the next pixel as
+// within the first one.
 std::vector<int32_t> FindStillPoints(const Model& model) {
   constexpr double kStillPx = 1;
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);

@@ -111,9 +111,8 @@ std::string NotJudgedSentence(const ModelCheck& check) {
 
 std::string StillPointsSentence(const ModelCheck& check) {
   return Counted(check.still_points.size(), "3D point", "stays", "stay") +
-         " at the same pixels while the cameras turn, as what a hood, a time "
-         "stamp or the background of a turntable shows does: they bend the "
-         "model.";
+         " at the same pixels while the cameras turn: a hood, a time stamp or "
+         "the background of a turntable bends the model.";
 }
 
 std::string MaskSteps(const std::string& images) {
