@@ -130,6 +130,24 @@ std::vector<std::vector<int32_t>> Neighbourhoods::FrameSets(
   return sets;
 }
 
+std::vector<int64_t> TakeCrowded(const KnownRotationProblem& problem,
+                                 const std::vector<char>& is_free,
+                                 std::vector<int64_t>* open) {
+  std::vector<int64_t> spare(problem.views.size(), 0);
+  for (size_t i = 0; i < is_free.size(); ++i) {
+    spare[problem.observations[i].view] += is_free[i];
+  }
+  const auto view_of = [&](int64_t i) { return problem.observations[i].view; };
+  for (const int64_t i : *open) spare[view_of(i)] -= 2;
+  std::vector<int64_t> crowded;
+  std::vector<int64_t> others;
+  std::partition_copy(open->begin(), open->end(), std::back_inserter(crowded),
+                      std::back_inserter(others),
+                      [&](int64_t i) { return spare[view_of(i)] < 0; });
+  *open = std::move(others);
+  return crowded;
+}
+
 namespace {
 
 // The cone of rays within a bound, in the world, at depth 1: { x = d + P y :

@@ -208,10 +208,16 @@ class Packing {
     }
   }
 
-  // Conflicts of two views come first: they are the smallest.
+  // Conflicts of two views are the smallest, but take three observations of the
+  // open one's view; conflicts of more views may take two, so crowded views try
+  // these first.
   void Charge(std::vector<int64_t>* open) {
+    std::vector<int64_t> crowded = TakeCrowded(problem_, is_free_, open);
+    ChargeInFrames(&crowded);
     ChargeInTwoViews(open);
+    ChargeInTwoViews(&crowded);
     ChargeInFrames(open);
+    open->insert(open->begin(), crowded.begin(), crowded.end());
   }
 
   void Take(Conflict conflict) {

@@ -223,6 +223,13 @@ class Neighbourhoods {
   std::vector<std::vector<int32_t>> points_of_frame_;  // ascending
 };
 
+// Takes out of `open` the observations in crowded views, and returns them:
+// views that have fewer than two free observations for each open one, as a
+// conflict in two views needs. Both keep their order.
+std::vector<int64_t> TakeCrowded(const KnownRotationProblem& problem,
+                                 const std::vector<char>& is_free,
+                                 std::vector<int64_t>* open);
+
 // Where to look for the smallest conflict of an observation o: with two other
 // points in its image and one more, six observations in all.
 //
