@@ -178,9 +178,9 @@ std::string PositionsConflictWords(const SolveSummary& summary) {
   if (positions.size() > kMost) {
     names += " and " + std::to_string(positions.size() - kMost) + " others";
   }
-  if (summary.support.empty()) return "";  // nothing is proved
   return positions.empty()
-             ? "; no position is part of the conflict"
+             ? TextIf(!summary.support.empty(),
+                      "; no position is part of the conflict")
              : "; in conflict are the positions of " + names + " and " +
                    Counted(static_cast<int64_t>(summary.support.size()),
                            "observation");
@@ -252,8 +252,7 @@ bool AreIdentity(const Model& model) {
                    [](const Frame& frame) { return frame.rig_from_world; });
 }
 
-// Warns of rotations that nobody has estimated. Where cameras never turn, as
-// above the ground, the identity is right: the result tells.
+// Warns of identity rotations, unless the result shows that they are right.
 void WarnOfIdentity(const LogOptions& log, const Model& model,
                     const SolveReport& report) {
   const SolveTermination end = report.summary.termination;

@@ -288,7 +288,7 @@ double UnitOfLength(const AdjustmentBlocks& blocks, const Context& context) {
             .norm());
   }
   const double median = distances.empty() ? 0 : MedianOf(distances, context);
-  return std::isnormal(median) ? std::exp2(std::ilogb(median)) : 1;
+  return std::isnormal(median) ? std::exp2(std::round(std::log2(median))) : 1;
 }
 
 void DivideLengths(double unit, AdjustmentBlocks* blocks) {

@@ -56,7 +56,7 @@ ceres::Solver::Options AdjustmentSolverOptions(
     const BundleAdjustmentOptions& options, const Context& context,
     AdjustmentBlocks* blocks, const ceres::Problem& problem);
 
-// A power of two near the median distance of points from their first frames,
+// The power of two nearest to the median distance of points from their first frames,
 // and all lengths of `blocks` divided by it, exactly. Ceres adds at least 1e-6
 // over the radius to the diagonal of J'J, which is little only where lengths
 // are neither tiny nor huge.
