@@ -246,12 +246,12 @@ struct WrongObservation {
   uint32_t point2D_idx = 0;
   Point3DId point3D_id = 0;
   double w = 0;  // infinite: the point is in the camera, or not before it
-  double error_px =
-      0;  // from where the rest of its track has the point; or NaN
+  // From where the rest of its track has the point; or NaN.
+  double error_px = 0;
   bool is_of_two = false;  // both are listed: nothing tells which is wrong
 };
 
-// Its wrong observations agree on a second point.
+// A track whose wrong observations agree on a second point.
 struct TwoPointTrack {
   Point3DId point3D_id = 0;
   int64_t num_first = 0;   // observations that agree with the point

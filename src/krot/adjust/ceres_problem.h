@@ -56,10 +56,10 @@ ceres::Solver::Options AdjustmentSolverOptions(
     const BundleAdjustmentOptions& options, const Context& context,
     AdjustmentBlocks* blocks, const ceres::Problem& problem);
 
-// The power of two nearest to the median distance of points from their first frames,
-// and all lengths of `blocks` divided by it, exactly. Ceres adds at least 1e-6
-// over the radius to the diagonal of J'J, which is little only where lengths
-// are neither tiny nor huge.
+// The power of two nearest to the median distance of points from their first
+// frames, and all lengths of `blocks` divided by such a unit, exactly. Ceres
+// adds at least 1e-6 over the radius to the diagonal of J'J, which is little
+// only where lengths are neither tiny nor huge.
 double UnitOfLength(const AdjustmentBlocks& blocks, const Context& context);
 void DivideLengths(double unit, AdjustmentBlocks* blocks);
 

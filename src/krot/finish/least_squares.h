@@ -108,13 +108,12 @@ void ShareErrorsOfPairs(const KnownRotationProblem& problem,
 //   sum_i c^2 r_i^2 / (c^2 + r_i^2),   c twice the median of the r_i,
 //
 // with r_i the residuals in pixels (p = 2; in the median those of a pair have
-// their mean square) [Geman, McClure 1987], by Gauss and
-// Newton's method with weights (c^2 / (c^2 + r_i^2))^2. c is taken anew after
-// every step, at first as sixteen times the median, and half as many each time
-// [Blake, Zisserman 1987]. An observation that does not see its point counts
-// c^2; a point that none sees stays. Steps are damped by the relative changes
-// of the depths, so that neither the scale nor what the observations hardly
-// hold runs away:
+// their mean square) [Geman, McClure 1987], by Gauss and Newton's method with
+// weights (c^2 / (c^2 + r_i^2))^2. c is taken anew after every step, at first
+// as sixteen times the median, and half as many each time [Blake, Zisserman
+// 1987]. An observation that does not see its point counts c^2; a point that
+// none sees stays. Steps are damped by the relative changes of the depths, so
+// that neither the scale nor what the observations hardly hold runs away:
 //
 //   sum_i weight_i (|r_i + dr_i|^2 + (damping c dw_i / w_i)^2).
 //
