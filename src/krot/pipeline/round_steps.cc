@@ -11,7 +11,6 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/problem/cost.h"
-#include "krot/problem/gauge.h"
 
 namespace krot::internal {
 namespace {
@@ -139,32 +138,6 @@ Estimate BestPointsOnSegments(const Reprojection& reprojection,
     if (cost_of(k) > before) best.points[k] = from.points[k];
   });
   return best;
-}
-
-void MoveInside(const BuiltProblem& built, Estimate* estimate) {
-  KnownRotationProblem of_model = built.problem;
-  of_model.observations.clear();
-  for (size_t i = 0; i < built.problem.observations.size(); ++i) {
-    if (!built.HasPixel(static_cast<int64_t>(i))) continue;
-    of_model.observations.push_back(built.problem.observations[i]);
-  }
-  IndexObservations(&of_model);
-  std::vector<WantedPlace> places;
-  for (const BuiltPosition& position : built.positions) {
-    WantedPlace place;
-    place.centre = position.region.centre;
-    place.unit_from_world = position.unit_from_world;
-    const Vector3d offset = OffsetOf(built, *estimate, position);
-    if (position.of == KnownPosition::Of::kImage) {
-      place.frame = built.problem.views[position.index].frame;
-      place.x = place.centre + offset;
-    } else {
-      place.point = position.index;
-      place.x = place.centre - offset;
-    }
-    places.push_back(place);
-  }
-  MoveToPlaces(of_model, places, estimate);
 }
 
 KeptPositions::KeptPositions(const Model& model,

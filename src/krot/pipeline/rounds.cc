@@ -153,13 +153,11 @@ class Rounds {
       return false;
     }
     Estimate solved = estimate_;
-    std::optional<Estimate> swept;
     is_bound_near_ = false;
     std::optional<Certificate> of_these = SolveRows(
         problem, {model_, rows_options_, method_, context_, timer_},
-        [&](const Estimate& after_sweeps, double linear_cost) {
-          if (positions_.Any()) swept = after_sweeps;
-          return HaveRowsServed(after_sweeps, linear_cost);
+        [this](const Estimate& swept, double linear_cost) {
+          return HaveRowsServed(swept, linear_cost);
         },
         &solved, bounded ? nullptr : &known_multipliers_, &summary_);
     if (options_.res_int.update_frames) {
@@ -182,19 +180,6 @@ class Rounds {
     if (options_.res_int.update_frames) {
       estimate_ = BestOnSegment(reprojection_, from, solved, options_.norm,
                                 context_, &round.step);
-      if (round.step < 1 && positions_.Any()) {
-        // The three cones of a position leave gaps around its region, into
-        // which the free shift and scale of a solve may drift.
-        MoveInside(built_, &solved);
-        TakeUnlessHeldBack(solved, &round.step);
-      }
-      // Sweeps may have solved the rows, too, nearer to where these were taken.
-      if (round.step < 1 && swept) {
-        MoveInside(built_, &*swept);
-        if (bounds_.IsWorthProving(LevelledCost(*swept))) {
-          TakeUnlessHeldBack(*swept, &round.step);
-        }
-      }
     } else {
       estimate_ = BestPointsOnSegments(reprojection_, rows, from, solved,
                                        options_.norm, context_.num_threads);
@@ -231,9 +216,8 @@ class Rounds {
     }
     if (has_level || is_bound_near_) return true;
     // Where a proof for the rows has reached the gap, another round could lower
-    // the cost by no more than that, and lenses would bend no less. But the
-    // cones of positions would be others.
-    if (!positions_.Any() && is_tried && round.linear_lower_bound &&
+    // the cost by no more than that, and lenses would bend no less.
+    if (is_tried && round.linear_lower_bound &&
         cost_ - *round.linear_lower_bound <= bounds_.relative_gap * cost_) {
       return false;
     }
@@ -243,20 +227,8 @@ class Rounds {
     // One idle round is enough without trust regions. It is enough, too, if the
     // cost is near the rows' bound but that proves nothing in true pixels: then
     // the estimate is a local minimum only.
-    if (!positions_.Any() &&
-        (num_bounded == 0 || (is_tried && !certificate()))) {
-      return !is_idle;
-    }
+    if (num_bounded == 0 || (is_tried && !certificate())) return !is_idle;
     return num_idle_rounds_ < 3;
-  }
-
-  // Takes the whole step to a solution of the rows that no position holds back,
-  // if it is better.
-  void TakeUnlessHeldBack(const Estimate& solved, double* step) {
-    const double cost = LevelledCost(solved);
-    if (cost > TrueCost(solved) || !(cost < LevelledCost(estimate_))) return;
-    estimate_ = solved;
-    *step = 1;
   }
 
   // Tries to prove a bound in true pixels from the last round's certificate of

@@ -116,10 +116,6 @@ Estimate BestPointsOnSegments(const Reprojection& reprojection,
 // strictly inside its constraints.
 inline constexpr double kKeptInRounds = kKeptPosition / 2;
 
-// Moves the estimate as a whole to where it keeps known positions best.
-// O(observations).
-void MoveInside(const BuiltProblem& built, Estimate* estimate);
-
 // The additional work of rounds where positions are known (reprojection.h):
 // finding the level, remembering the best estimate that keeps all positions,
 // and trying proofs at levels below the cost that was reached.

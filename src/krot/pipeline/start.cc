@@ -9,8 +9,9 @@
 #include "krot/geometry.h"
 #include "krot/joint/component_solve.h"
 #include "krot/joint/joint.h"
-#include "krot/pipeline/rounds.h"
 #include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
+#include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {
 
@@ -65,6 +66,33 @@ bool IsFarFromPositions(const Model& model, const BuiltProblem& own,
            options.init_max_error);
 }
 
+// Moves the model as a whole to where it keeps known positions best.
+void MoveToPositions(const BuiltProblem& built, Estimate* estimate) {
+  KnownRotationProblem of_model = built.problem;
+  of_model.observations.clear();
+  for (size_t i = 0; i < built.problem.observations.size(); ++i) {
+    if (!built.HasPixel(static_cast<int64_t>(i))) continue;
+    of_model.observations.push_back(built.problem.observations[i]);
+  }
+  IndexObservations(&of_model);
+  std::vector<WantedPlace> places;
+  for (const BuiltPosition& position : built.positions) {
+    WantedPlace place;
+    place.centre = position.region.centre;
+    place.unit_from_world = position.unit_from_world;
+    const Eigen::Vector3d offset = OffsetOf(built, *estimate, position);
+    if (position.of == KnownPosition::Of::kImage) {
+      place.frame = built.problem.views[position.index].frame;
+      place.x = place.centre + offset;
+    } else {
+      place.point = position.index;
+      place.x = place.centre - offset;
+    }
+    places.push_back(place);
+  }
+  MoveToPlaces(of_model, places, estimate);
+}
+
 BuiltProblem Build(const Model& model, const SolveModelOptions& options,
                    const Context& context, bool ignore_translations) {
   BuildProblemOptions build_options = options.problem;
@@ -92,7 +120,7 @@ Start OwnStart(const Model& model, const SolveModelOptions& options,
                                  context.num_threads);
   };
   const double before = cost();
-  MoveInside(built, &built.start);
+  MoveToPositions(built, &built.start);
   start.has_lost_digits = cost() > (1 + kErrorRounding) * before;
   return start;
 }
